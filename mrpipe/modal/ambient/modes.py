@@ -11,8 +11,8 @@ known: the scale of M, C and K then comes from given masses or from added masses
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -22,10 +22,12 @@ from scipy import signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
-from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records, least_samples
+from mrpipe.modal.ambient.clusters import Cluster, clustered, matched, without_copies
+from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Records, least_samples
 from mrpipe.modal.ambient.refine import refine_by_spectra, two_peaks
 from mrpipe.modal.ambient.setup_scales import scaled_by_orthogonality, scaling_notes
 from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
+from mrpipe.modal.ambient.stationarity import block_weights, effective_share
 from mrpipe.modal.fit.lscf import PoleCandidate
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -40,29 +42,9 @@ _PERIODS = 1.5
 """Length of the correlation functions in periods of the lowest peak."""
 _MOST_BLOCK_ROWS = 80
 _LEAST_BLOCK_ROWS = 20
-_FREQUENCY_TOLERANCE = 0.01
-_LEAST_ASSURANCE = 0.9
 _LEAST_COLLINEARITY = 0.5
 _LARGEST_SPREAD = 4.0
-_COPY_RANGE = 0.1
-_COPY_ASSURANCE = 0.7
 _SCALINGS = 2
-
-
-@dataclass(frozen=True)
-class _Cluster:
-    """Poles of several orders that represent the same mode: medians, shape rotated to real, number of orders."""
-
-    angular_frequency: float
-    damping_ratio: float
-    shape: FloatArray
-    collinearity: float
-    orders: int
-
-    @property
-    def pole(self) -> tuple[float, float]:
-        """Angular frequency [rad/s] and damping ratio."""
-        return self.angular_frequency, self.damping_ratio
 
 
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
@@ -110,111 +92,12 @@ def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float,
         raise UserError(source, f"tests.{test.name}", problem, remedy)
 
 
-def _assurance(first: ComplexArray, second: ComplexArray) -> float:
-    return float(np.abs(np.vdot(first, second)) ** 2)
-
-
-def _distance(pole: Pole, group: Sequence[Pole]) -> float:
-    """Return the distance of a pole from a cluster, relative to the frequency; infinite if it cannot belong to it."""
-    omega = float(np.median([item.angular_frequency for item in group]))
-    zeta = float(np.median([item.damping_ratio for item in group]))
-    assurance = _assurance(pole.shape, group[0].shape)
-    gap = abs(pole.angular_frequency / omega - 1.0)
-    if gap >= _FREQUENCY_TOLERANCE or assurance <= _LEAST_ASSURANCE:
-        return np.inf
-    return float(np.hypot(gap, pole.damping_ratio - zeta)) + 1.0 - assurance
-
-
-def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
-    """Group poles of neighbouring frequency and equal shape, at most one of each order in a group.
-
-    Of each order the pole nearest to a group is taken first. High orders split a mode into a stable pole and one that
-    changes with the order; in another sequence the second pole could replace the first.
-    """
-    groups: list[list[Pole]] = []
-    for order in sorted({pole.order for pole in poles}, reverse=True):
-        own = [pole for pole in poles if pole.order == order]
-        known = len(groups)
-        pairs = sorted((_distance(pole, groups[j]), i, j) for i, pole in enumerate(own) for j in range(known))
-        taken: dict[int, int] = {}
-        for distance, i, j in pairs:
-            if np.isfinite(distance) and i not in taken and j not in taken.values():
-                taken[i] = j
-        for i, pole in enumerate(own):
-            if i in taken:
-                groups[taken[i]].append(pole)
-            else:
-                groups.append([pole])
-    return [_summary(group) for group in groups]
-
-
-def _summary(group: Sequence[Pole]) -> _Cluster:
-    reference = group[0].shape
-    turned = np.mean([item.shape * np.exp(-1j * np.angle(np.vdot(reference, item.shape))) for item in group], axis=0)
-    # the phase that makes the shape as real as it can be
-    turned = turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))
-    collinearity = float(np.abs(np.sum(turned**2)) / np.sum(np.abs(turned) ** 2))
-    return _Cluster(
-        float(np.median([item.angular_frequency for item in group])),
-        float(np.median([item.damping_ratio for item in group])),
-        np.asarray(turned.real / np.linalg.norm(turned.real)),
-        collinearity,
-        len(group),
-    )
-
-
-def _without_copies(
-    clusters: Sequence[_Cluster],
-    weights: FloatArray,
-    is_second_peak: Callable[[tuple[float, float], tuple[float, float]], bool],
-) -> tuple[list[_Cluster], list[bool]]:
-    """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
-
-    A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
-    may also be another mode with a similar shape at the sensors. It is one if the spectra have a peak for each of the
-    two. The second result marks the poles for which they do not. Both results are sorted by frequency.
-
-    Parameters
-    ----------
-    clusters
-        Stable poles.
-    weights
-        Shape (s,): weights of the sensors for the comparison of shapes. Modes are orthogonal to the mass, so that these
-        are the roots of the floor masses where they are known; a light mast would otherwise make all shapes alike.
-    is_second_peak
-        Whether the spectra show a pole (the first argument) beside another one, each as angular frequency and damping.
-    """
-    kept: list[_Cluster] = []
-    doubtful: list[bool] = []
-    for item in sorted(clusters, key=lambda cluster: (-cluster.orders, -cluster.collinearity)):
-        own = weights * item.shape
-        alike = [known for known in kept if _cosine(weights * known.shape, own) ** 2 >= _COPY_ASSURANCE]
-        gaps = [abs(known.angular_frequency - item.angular_frequency) for known in alike]
-        widths = [sum(pole.damping_ratio * pole.angular_frequency for pole in (known, item)) for known in alike]
-        if all(gap >= width for gap, width in zip(gaps, widths, strict=True)):
-            near = [known for known, gap in zip(alike, gaps, strict=True) if gap < _COPY_RANGE * item.angular_frequency]
-            kept.append(item)
-            doubtful.append(not all(is_second_peak(item.pole, known.pole) for known in near))
-    rising = np.argsort([item.angular_frequency for item in kept])
-    return [kept[i] for i in rising], [doubtful[i] for i in rising]
-
-
-def _cosine(first: FloatArray, second: FloatArray) -> float:
-    return float(first @ second) / max(float(np.linalg.norm(first) * np.linalg.norm(second)), 1e-300)
-
-
-def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
-    near = [item for item in clusters if abs(item.angular_frequency / pole.angular_frequency - 1.0) < 0.03]
-    same = [item for item in near if (item.shape @ pole.shape) ** 2 > 0.5]
-    return max(same, key=lambda item: (item.orders, (item.shape @ pole.shape) ** 2), default=None)
-
-
 def _jackknife(
     statistics: Sequence[ComplexArray | FloatArray],
     records: Records,
     estimator: Estimator,
     orders: Sequence[int],
-    firm: Sequence[_Cluster],
+    firm: Sequence[Cluster],
 ) -> tuple[FloatArray, FloatArray]:
     """Return the covariance of (ln omega, ln zeta), shape (2r, 2r), and errors of the shapes, shape (s, r)."""
     modes, sensors = len(firm), firm[0].shape.size
@@ -223,10 +106,10 @@ def _jackknife(
     few = orders[:: max(1, len(orders) // 3)]
     for left_out in statistics:
         mean = (total - left_out) / (len(statistics) - 1)
-        clusters = _clusters(estimator.poles(mean, records, few))
+        clusters = clustered(estimator.poles(mean, records, few))
         row, sheet = np.full(2 * modes, np.nan), np.full((sensors, modes), np.nan)
         for index, pole in enumerate(firm):
-            match = _matched(clusters, pole)
+            match = matched(clusters, pole)
             if match is not None:
                 row[index] = np.log(match.angular_frequency / pole.angular_frequency)
                 row[modes + index] = np.log(match.damping_ratio / pole.damping_ratio)
@@ -240,7 +123,7 @@ def _jackknife(
 
 
 def _as_fit(
-    test: FrameTest, firm: Sequence[_Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
+    test: FrameTest, firm: Sequence[Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
 ) -> MultiModeFit:
     """Return clusters, sorted by frequency, as a fit; shapes are scaled by the response at their frequency."""
     zeta = np.array([item.damping_ratio for item in firm])
@@ -366,14 +249,17 @@ def _set_up(
     records = _records(tests, layout, *band_hz)
     _require_length(records, tests, band_hz[0], source)
     orders = estimator.orders(layout.floors, len(tests[0].sensors))
-    statistics = [estimator.statistic(block, records) for block in records.blocks]
+    weights = block_weights(records.blocks) if _share_of(tests, records) < 1.0 else np.ones(len(records.blocks))
+    statistics = [
+        weight * estimator.statistic(block, records) for weight, block in zip(weights, records.blocks, strict=True)
+    ]
     poles = estimator.poles(np.mean(np.array(statistics), axis=0), records, orders)
-    clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
+    clusters = [item for item in clustered(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
     most = max((item.orders for item in clusters), default=0)
     firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
     floors = [sensor.floor - 1 for sensor in tests[0].sensors]
-    weights = np.ones(len(floors)) if layout.masses is None else np.sqrt(layout.masses[floors])
-    firm, doubtful = _without_copies(firm, weights, partial(two_peaks, tests))
+    masses = np.ones(len(floors)) if layout.masses is None else layout.masses[floors]
+    firm, doubtful = without_copies(firm, np.sqrt(masses), partial(two_peaks, tests))
     if not firm:
         remedy = "record longer, or set identify_frame.band_high_hz"
         raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)
@@ -383,7 +269,18 @@ def _set_up(
     return SetUp(tuple(tests), fit, tuple(doubtful)), found, records.high_hz
 
 
-def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:
+def _share_of(tests: Sequence[FrameTest], records: Records) -> float:
+    """Return the least share of a test that counts, from all sensors in the band of the analysis."""
+    shares = []
+    for test in tests:
+        lines = np.fft.rfft(test.responses - test.responses.mean(axis=0), axis=0)
+        frequency = np.fft.rfftfreq(test.responses.shape[0], 1.0 / test.sampling_rate_hz)
+        inside = (frequency >= 0.5 * records.high_hz / _LARGEST_SPREAD) & (frequency <= records.high_hz)
+        shares.append(effective_share(list(lines[inside].T)))
+    return min(shares)
+
+
+def _response_at(tests: Sequence[FrameTest], firm: Sequence[Cluster]) -> FloatArray:
     """Return the spectral amplitude of the responses at the frequency of each cluster over the median, shape (r,)."""
     test = tests[0]
     length = int(min(test.responses.shape[0], 4096))

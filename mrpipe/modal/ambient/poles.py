@@ -105,7 +105,7 @@ class SubspaceEstimator:
             values, vectors = np.linalg.eig(state[order])
             poles = np.asarray(np.log(values.astype(np.complex128)) * records.rate_hz, dtype=np.complex128)
             shapes = np.asarray(output[order])[:channels] @ vectors
-            found += _physical(poles, shapes, order, records)
+            found += physical(poles, shapes, order, records)
         return found
 
 
@@ -140,7 +140,7 @@ class PolyreferenceEstimator:
             values, vectors = np.linalg.eig(state)
             kept = np.abs(values) > 0.0
             poles = np.log(values[kept].astype(np.complex128)) * records.rate_hz + window
-            found += _physical(np.asarray(poles), np.asarray(output @ vectors[:, kept]), order, records)
+            found += physical(np.asarray(poles), np.asarray(output @ vectors[:, kept]), order, records)
         return found
 
 
@@ -171,9 +171,20 @@ def _segment(records: Records) -> int:
     return 2 * int(min(wanted, shortest // 4) // 2)
 
 
-def _physical(
-    poles: NDArray[np.complex128], shapes: NDArray[np.complex128], order: int, records: Records
-) -> list[Pole]:
+def physical(poles: NDArray[np.complex128], shapes: NDArray[np.complex128], order: int, records: Records) -> list[Pole]:
+    """Return the poles inside the band with a plausible damping ratio.
+
+    Parameters
+    ----------
+    poles
+        Shape (p,) [rad/s].
+    shapes
+        Shape (s, p).
+    order
+        Model order.
+    records
+        For the band.
+    """
     found = []
     for pole, shape in zip(poles, shapes.T, strict=True):
         omega = float(abs(pole))
