@@ -206,7 +206,7 @@ def _search(
     """Return the modes of set-ups in a band."""
     set_ups, candidates, tops = [], [], []
     for group in groups:
-        set_up, found, top = _set_up(group, layout, band_hz, source, estimator)
+        set_up, found, top = _set_up(group, layout, band_hz, source, estimator, alone=len(groups) == 1)
         set_ups.append(set_up)
         candidates += found
         tops.append(top)
@@ -243,7 +243,13 @@ def _numbered(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
 
 
 def _set_up(
-    tests: Sequence[FrameTest], layout: Layout, band_hz: tuple[float, float], source: Path, estimator: Estimator
+    tests: Sequence[FrameTest],
+    layout: Layout,
+    band_hz: tuple[float, float],
+    source: Path,
+    estimator: Estimator,
+    *,
+    alone: bool,
 ) -> tuple[SetUp, list[PoleCandidate], float]:
     """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
     records = _records(tests, layout, *band_hz)
@@ -259,7 +265,9 @@ def _set_up(
     firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
     floors = [sensor.floor - 1 for sensor in tests[0].sensors]
     masses = np.ones(len(floors)) if layout.masses is None else layout.masses[floors]
-    firm, doubtful = without_copies(firm, np.sqrt(masses), partial(two_peaks, tests))
+    # with several set-ups, a pole that only one of them shows is not a mode, whatever its spectra show
+    peaks = partial(two_peaks, tests, [item.pole for item in firm]) if alone else lambda *_: False
+    firm, doubtful = without_copies(firm, np.sqrt(masses), peaks)
     if not firm:
         remedy = "record longer, or set identify_frame.band_high_hz"
         raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)

@@ -196,7 +196,12 @@ def _refined(peaks: Sequence[_Peak], pole: float, starts: Sequence[float]) -> tu
     return float(np.exp(theta[0])), float(np.exp(theta[1])), covariance
 
 
-def two_peaks(tests: Sequence[FrameTest], pole: tuple[float, float], known: tuple[float, float]) -> bool:
+def two_peaks(
+    tests: Sequence[FrameTest],
+    poles: Sequence[tuple[float, float]],
+    pole: tuple[float, float],
+    known: tuple[float, float],
+) -> bool:
     """Return whether the spectra have a peak at a pole in addition to that of another pole near it.
 
     A pole that an estimator splits from a mode adds no peak. One resonance, with free frequency and damping, is
@@ -207,10 +212,13 @@ def two_peaks(tests: Sequence[FrameTest], pole: tuple[float, float], known: tupl
     ----------
     tests
         The ambient tests.
+    poles
+        All poles, each as angular frequency [rad/s] and damping ratio: the others contribute with and without a peak.
     pole, known
-        Angular frequency [rad/s] and damping ratio of each.
+        The two poles.
     """
     middle, half = 0.5 * (pole[0] + known[0]), 2.0 * abs(pole[0] - known[0])
+    others = [item for item in poles if item not in (pole, known) and abs(item[0] - middle) < 2.0 * half]
     sums = []
     for item in _transforms(tests, np.eye(len(tests[0].sensors))):
         inside = item.inside(middle - half, middle + half)
@@ -225,8 +233,8 @@ def two_peaks(tests: Sequence[FrameTest], pole: tuple[float, float], known: tupl
     one, two = np.inf, np.inf
     for first, second in ((pole, known), (known, pole)):
         starts = (first[1], abs(pole[0] - known[0]) / middle)
-        one = min(one, _best(_Peak(spectrum, first[0], []), first[0], starts)[0])
-        two = min(two, _best(_Peak(spectrum, first[0], [second]), first[0], starts)[0])
+        one = min(one, _best(_Peak(spectrum, first[0], others), first[0], starts)[0])
+        two = min(two, _best(_Peak(spectrum, first[0], [second, *others]), first[0], starts)[0])
     # a second peak has three parameters
     return bool(stats.chi2.sf(2.0 * (one - two), 3) < _FALSE_PEAK)
 

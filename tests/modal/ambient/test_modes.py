@@ -165,4 +165,14 @@ def test_the_spectra_of_one_mode_have_no_second_peak(tower_and_test):
     tower, test = tower_and_test
     omega, ratio = 2 * np.pi * tower.frequencies_hz[1], tower.damping_ratios[1]
     for apart in (0.96, 1.04):
-        assert not two_peaks([test], (apart * omega, ratio), (omega, ratio))
+        assert not two_peaks([test], [], (apart * omega, ratio), (omega, ratio))
+
+
+@pytest.mark.planted
+def test_a_neighbouring_mode_is_no_second_peak(tower_and_test):
+    """A false pole near a mode had stood for the flank of the next mode, which lies in the same band."""
+    tower, test = tower_and_test
+    modes = list(zip(2 * np.pi * tower.frequencies_hz, tower.damping_ratios, strict=True))
+    (low, _), high = modes[2], modes[3]
+    false = (high[0] - 0.5 * (high[0] - low), 0.014)
+    assert not two_peaks([test], [*modes, false], false, high)
