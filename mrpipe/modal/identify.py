@@ -111,7 +111,8 @@ def identify_frame(
 
 
 def _layout(tests: FrameTests) -> Layout:
-    directions = {sensor.direction for test in (*tests.forced, *tests.ambient) for sensor in test.sensors}
+    shown = (*tests.forced, *tests.ambient) or tests.decays
+    directions = {sensor.direction for test in shown for sensor in test.sensors}
     if tests.positions:
         return Layout(3 * tests.floor_masses.size, None, is_chain=False)
     masses = tests.floor_masses if np.isfinite(tests.floor_masses).all() else None
@@ -199,6 +200,9 @@ def _shape_findings(search: ModeSearch, layout: Layout) -> list[str]:
 def _damping(tests: FrameTests, fit: MultiModeFit, options: IdentificationOptions) -> tuple[_Damping, list[str]]:
     decays, findings = decays_of_modes(tests, fit)
     frequencies, of_the_fit = _estimates(fit)
+    if not tests.forced and not tests.ambient and options.decay_method == "exponential-fit":
+        # the fit contains all modes and all decays already
+        return _Damping(frequencies, of_the_fit, decays, of_the_fit, ("decay",) * len(of_the_fit)), []
     other = "sweep" if tests.forced else "ambient"
     used, sources, notes = choose_damping(of_the_fit, decays, options.damping_from, other, options.decay_method)
     return _Damping(frequencies, of_the_fit, decays, used, sources), [*findings, *notes]

@@ -1,4 +1,4 @@
-"""The modes of a frame from its forced tests, or from its ambient tests if no test is forced."""
+"""The modes of a frame from its forced tests, from its ambient tests if none is forced, else from its free decays."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.modal.ambient.clocks import synchronised
+from mrpipe.modal.ambient.free_decays import find_decay_modes
+from mrpipe.modal.ambient.harmonics import harmonic_findings, without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.clocks.delays import SensorClock
 from mrpipe.modal.fit.own_residues import with_own_residues
@@ -35,7 +37,8 @@ def find_modes(
     tests
         All tests of the frame.
     forced
-        Forced tests, those for training first. Without forced tests, the modes come from the ambient tests.
+        Forced tests, those for training first. Without forced tests, the modes come from the ambient tests, and
+        without these from the free decays.
     layout
         Number of floors and how the sensors stand on them.
     options
@@ -49,11 +52,16 @@ def find_modes(
         If no mode is found.
     """
     progress(0.05, "poles")
+    if not forced and not tests.ambient:
+        search = find_decay_modes(tests.decays, layout, options.band_low_hz, options.band_high_hz, tests.source)
+        return ChosenTests(search, ()), (), [*_ambient_findings(tests), *search.notes]
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        ambient, corrected = synchronised(tests.ambient, band, options)
+        quiet, harmonics = without_harmonics(tests.ambient, options.band_low_hz)
+        ambient, corrected = synchronised(quiet, band, options)
         search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
-        findings = [*_ambient_findings(tests), *_clock_findings(corrected), *search.notes]
+        findings = [*_ambient_findings(tests), *harmonic_findings(harmonics)]
+        findings += [*_clock_findings(corrected), *search.notes]
         return ChosenTests(search, ()), corrected, findings
     chosen, findings = choose_tests(forced, tests, layout, options)
     if tests.ambient:

@@ -333,12 +333,12 @@ class FrameTests:
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
-    """Return the forced, ambient and decay tests of a frame campaign.
+    """Return the forced, ambient and decay tests of a frame campaign; free decays alone are sufficient for modes.
 
     Raises
     ------
     UserError
-        If the rig is not a shear-frame, no test is forced or ambient, or masses are too few or not positive.
+        If the rig is not a shear-frame, no test shows modes, or masses are too few or not positive.
     """
     source = campaign.file
     if campaign.rig != "shear-frame":
@@ -346,8 +346,10 @@ def frame_tests(campaign: Campaign) -> FrameTests:
     divided = in_unbroken_parts(campaign, {"sweep", "random", "ambient"})
     campaign = divided.campaign
     used = [item for item in campaign.recordings if item.kind in {"sweep", "random", "ambient"}]
+    used = used or [item for item in campaign.recordings if item.kind == "free-decay"]
     if not used:
-        raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced or ambient test")
+        remedy = "modes need a test of kind sweep, random, ambient or free-decay"
+        raise UserError(source, "tests", "no test of a kind that shows modes", remedy)
     masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
     floors = masses.size or max(frame_test(item, source).floors for item in used)
     if masses.size:
@@ -364,7 +366,7 @@ def frame_tests(campaign: Campaign) -> FrameTests:
     if len(changed) == len(every):
         place = f"tests.{changed[0].name}.added_masses_kg"
         raise UserError(
-            source, place, "all tests have added masses", "record a sweep, random or ambient test without them as well"
+            source, place, "all tests have added masses", "record a test of the same kind without them as well"
         )
     directions = {sensor.direction for item in used for sensor in _sensors(item)}
     positions, inertias = floor_plan(campaign, directions, floors, source)

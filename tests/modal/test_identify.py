@@ -104,7 +104,7 @@ def test_random_excitation_and_no_decay():
     result = identify(frame, [random_test(frame, rng, replace(RIG, sweep_s=240.0))])
     assert_close(result, frame)
     assert result.damping_source == ("sweep",) * 4
-    assert "no free decay of modes 1, 2, 3, 4: damping from the forced tests" in result.findings
+    assert not any("no free decay" in line for line in result.findings)  # nobody missed a test that was not made
 
 
 @pytest.mark.planted
@@ -177,7 +177,7 @@ def test_modes_beyond_the_excitation_are_left_out_and_named():
     assert count == np.count_nonzero(truth.frequencies_hz < 7.0)
     omega = np.array([item.value for item in result.frequencies])
     assert omega == pytest.approx(truth.angular_frequencies[:count], rel=2e-3)
-    assert any("are not determined by the data" in line for line in result.findings)
+    assert any("not determined by the data" in line for line in result.findings)
     # the storey model is determined by fewer modes where every floor has a sensor
     assert result.frame.stiffness == pytest.approx(frame.stiffness, abs=0.02 * np.abs(frame.stiffness).max())
 
@@ -336,6 +336,6 @@ def test_a_shaker_without_its_floor_is_told():
     no_floor = {k: v for k, v in no_channel.items() if not k.startswith("floor_")}
     text = message_of(lambda: frame_tests(replace(campaign, recordings=(replace(bare, channels=no_floor),))))
     assert "no floor_acceleration_1" in text
-    only_decays = replace(campaign, recordings=(replace(campaign.recordings[0], kind="free-decay"),))
-    assert "no test of kind sweep or random" in message_of(lambda: frame_tests(only_decays))
+    other = replace(campaign, recordings=(replace(campaign.recordings[0], kind="harmonic"),))
+    assert "no test of a kind that shows modes" in message_of(lambda: frame_tests(other))
     assert isinstance(test, FrameTest)

@@ -108,3 +108,11 @@ def test_both_listed_segments_are_used() -> None:
     part = replace(recording(), segments=((0, 150), (200, 380)))
     tests = frame_tests(Campaign("c", "shear-frame", Path(), (part,), floor_masses_kg=(1.0, 1.0)))
     assert [test.responses.shape[0] for test in tests.forced] == [150, 180] and not tests.notes
+
+
+def test_free_decays_alone_are_sufficient_and_a_campaign_without_any_test_of_modes_is_refused() -> None:
+    campaign = Campaign("c", "shear-frame", Path(), (recording("free-decay"),), floor_masses_kg=(1.0, 1.0))
+    tests = frame_tests(campaign)
+    assert [test.name for test in tests.decays] == ["one"] and not tests.forced and not tests.ambient
+    with pytest.raises(UserError, match="modes need a test of kind sweep, random, ambient or free-decay"):
+        frame_tests(replace(campaign, recordings=(recording("harmonic"),)))

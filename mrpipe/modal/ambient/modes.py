@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,12 @@ from scipy import signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
-from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records
-from mrpipe.modal.ambient.refine import refine_by_spectra
+from mrpipe.modal.ambient.clusters import Cluster, clustered, matched, without_copies
+from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Records, least_samples
+from mrpipe.modal.ambient.refine import refine_by_spectra, two_peaks
 from mrpipe.modal.ambient.setup_scales import scaled_by_orthogonality, scaling_notes
 from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
+from mrpipe.modal.ambient.stationarity import block_weights, effective_share
 from mrpipe.modal.fit.lscf import PoleCandidate
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -33,28 +36,15 @@ from mrpipe.modal.search.selection import Layout, complete_set, largest_set
 from mrpipe.modal.spectra import ComplexArray
 
 _BLOCKS = 8
+_LEAST_BLOCKS = 4
+"""Least number of blocks of a short record: fewer give no error of the shapes."""
 _PERIODS = 1.5
 """Length of the correlation functions in periods of the lowest peak."""
 _MOST_BLOCK_ROWS = 80
 _LEAST_BLOCK_ROWS = 20
-_FREQUENCY_TOLERANCE = 0.01
-_LEAST_ASSURANCE = 0.9
 _LEAST_COLLINEARITY = 0.5
 _LARGEST_SPREAD = 4.0
-_COPY_RANGE = 0.1
-_COPY_ASSURANCE = 0.7
 _SCALINGS = 2
-
-
-@dataclass(frozen=True)
-class _Cluster:
-    """Poles of several orders that represent the same mode: medians, shape rotated to real, number of orders."""
-
-    angular_frequency: float
-    damping_ratio: float
-    shape: FloatArray
-    collinearity: float
-    orders: int
 
 
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
@@ -66,22 +56,25 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
     high = high_hz or min(spread * first, USABLE_BAND * rate, common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
-    whole = sum(test.responses.shape[0] for test in tests)
-    blocks: list[FloatArray] = []
-    for test in tests:
-        values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
-        # blocks of all tests have about the same length, because their statistics are averaged
-        count = max(-(-2 // len(tests)), round(_BLOCKS * values.shape[0] / whole))
-        if factor > 1:
-            values = signal.resample_poly(values, 1, factor, axis=0)
-        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, count)]
     own_rate = rate / factor
     rows = int(np.clip(round(_PERIODS * own_rate / first), _LEAST_BLOCK_ROWS, _MOST_BLOCK_ROWS))
+    filtered = []
+    for test in tests:
+        values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
+        filtered.append(signal.resample_poly(values, 1, factor, axis=0) if factor > 1 else values)
+    whole = sum(values.shape[0] for values in filtered)
+    # a short record has fewer blocks, because each of them must be longer than the correlation functions
+    most = int(np.clip(whole // least_samples(rows), _LEAST_BLOCKS, _BLOCKS))
+    blocks: list[FloatArray] = []
+    for values in filtered:
+        # blocks of all tests have about the same length, because their statistics are averaged
+        count = max(-(-2 // len(tests)), round(most * values.shape[0] / whole))
+        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, count)]
     return Records(tuple(blocks), own_rate, rows, high)
 
 
 def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float, source: Path) -> None:
-    """Refuse tests whose blocks are shorter than the correlation functions.
+    """Refuse tests whose blocks are too short for the correlation functions.
 
     Raises
     ------
@@ -89,94 +82,14 @@ def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float,
         If a block is too short.
     """
     shortest = min(block.shape[1] for block in records.blocks)
-    least = 2 * records.block_rows + 2
-    if shortest <= least:
-        place = f"tests.{tests[0].name}"
-        blocks = len(records.blocks) // len(tests)
-        lasts, needed = (blocks * count / records.rate_hz for count in (shortest, least))
+    least = least_samples(records.block_rows)
+    if shortest < least:
+        test = min(tests, key=lambda item: item.duration_s)
+        needed = test.duration_s * (least + 1) / shortest
         peak = f"the lowest peak of the responses, at {lowest_peak_hz(tests, low_hz):.3g} Hz"
-        problem = f"lasts {lasts:.3g} s; {peak}, needs more than {needed:.3g} s"
+        problem = f"lasts {test.duration_s:.3g} s; {peak}, needs at least {needed:.3g} s"
         remedy = "record longer, or set identify_frame.band_low_hz just below the first mode if the peak is a drift"
-        raise UserError(source, place, problem, remedy)
-
-
-def _assurance(first: ComplexArray, second: ComplexArray) -> float:
-    return float(np.abs(np.vdot(first, second)) ** 2)
-
-
-def _distance(pole: Pole, group: Sequence[Pole]) -> float:
-    """Return the distance of a pole from a cluster, relative to the frequency; infinite if it cannot belong to it."""
-    omega = float(np.median([item.angular_frequency for item in group]))
-    zeta = float(np.median([item.damping_ratio for item in group]))
-    assurance = _assurance(pole.shape, group[0].shape)
-    gap = abs(pole.angular_frequency / omega - 1.0)
-    if gap >= _FREQUENCY_TOLERANCE or assurance <= _LEAST_ASSURANCE:
-        return np.inf
-    return float(np.hypot(gap, pole.damping_ratio - zeta)) + 1.0 - assurance
-
-
-def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
-    """Group poles of neighbouring frequency and equal shape, at most one of each order in a group.
-
-    Of each order the pole nearest to a group is taken first. High orders split a mode into a stable pole and one that
-    changes with the order; in another sequence the second pole could replace the first.
-    """
-    groups: list[list[Pole]] = []
-    for order in sorted({pole.order for pole in poles}, reverse=True):
-        own = [pole for pole in poles if pole.order == order]
-        known = len(groups)
-        pairs = sorted((_distance(pole, groups[j]), i, j) for i, pole in enumerate(own) for j in range(known))
-        taken: dict[int, int] = {}
-        for distance, i, j in pairs:
-            if np.isfinite(distance) and i not in taken and j not in taken.values():
-                taken[i] = j
-        for i, pole in enumerate(own):
-            if i in taken:
-                groups[taken[i]].append(pole)
-            else:
-                groups.append([pole])
-    return [_summary(group) for group in groups]
-
-
-def _summary(group: Sequence[Pole]) -> _Cluster:
-    reference = group[0].shape
-    turned = np.mean([item.shape * np.exp(-1j * np.angle(np.vdot(reference, item.shape))) for item in group], axis=0)
-    # the phase that makes the shape as real as it can be
-    turned = turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))
-    collinearity = float(np.abs(np.sum(turned**2)) / np.sum(np.abs(turned) ** 2))
-    return _Cluster(
-        float(np.median([item.angular_frequency for item in group])),
-        float(np.median([item.damping_ratio for item in group])),
-        np.asarray(turned.real / np.linalg.norm(turned.real)),
-        collinearity,
-        len(group),
-    )
-
-
-def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[bool]]:
-    """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
-
-    A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
-    may also be another mode with a similar shape at the sensors. The second result marks these poles. Both results are
-    sorted by frequency.
-    """
-    kept: list[_Cluster] = []
-    doubtful: list[bool] = []
-    for item in sorted(clusters, key=lambda cluster: (-cluster.orders, -cluster.collinearity)):
-        alike = [known for known in kept if (known.shape @ item.shape) ** 2 >= _COPY_ASSURANCE]
-        gaps = [abs(known.angular_frequency - item.angular_frequency) for known in alike]
-        widths = [sum(pole.damping_ratio * pole.angular_frequency for pole in (known, item)) for known in alike]
-        if all(gap >= width for gap, width in zip(gaps, widths, strict=True)):
-            kept.append(item)
-            doubtful.append(any(gap < _COPY_RANGE * item.angular_frequency for gap in gaps))
-    rising = np.argsort([item.angular_frequency for item in kept])
-    return [kept[i] for i in rising], [doubtful[i] for i in rising]
-
-
-def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
-    near = [item for item in clusters if abs(item.angular_frequency / pole.angular_frequency - 1.0) < 0.03]
-    same = [item for item in near if (item.shape @ pole.shape) ** 2 > 0.5]
-    return max(same, key=lambda item: (item.orders, (item.shape @ pole.shape) ** 2), default=None)
+        raise UserError(source, f"tests.{test.name}", problem, remedy)
 
 
 def _jackknife(
@@ -184,7 +97,7 @@ def _jackknife(
     records: Records,
     estimator: Estimator,
     orders: Sequence[int],
-    firm: Sequence[_Cluster],
+    firm: Sequence[Cluster],
 ) -> tuple[FloatArray, FloatArray]:
     """Return the covariance of (ln omega, ln zeta), shape (2r, 2r), and errors of the shapes, shape (s, r)."""
     modes, sensors = len(firm), firm[0].shape.size
@@ -193,10 +106,10 @@ def _jackknife(
     few = orders[:: max(1, len(orders) // 3)]
     for left_out in statistics:
         mean = (total - left_out) / (len(statistics) - 1)
-        clusters = _clusters(estimator.poles(mean, records, few))
+        clusters = clustered(estimator.poles(mean, records, few))
         row, sheet = np.full(2 * modes, np.nan), np.full((sensors, modes), np.nan)
         for index, pole in enumerate(firm):
-            match = _matched(clusters, pole)
+            match = matched(clusters, pole)
             if match is not None:
                 row[index] = np.log(match.angular_frequency / pole.angular_frequency)
                 row[modes + index] = np.log(match.damping_ratio / pole.damping_ratio)
@@ -210,7 +123,7 @@ def _jackknife(
 
 
 def _as_fit(
-    test: FrameTest, firm: Sequence[_Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
+    test: FrameTest, firm: Sequence[Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
 ) -> MultiModeFit:
     """Return clusters, sorted by frequency, as a fit; shapes are scaled by the response at their frequency."""
     zeta = np.array([item.damping_ratio for item in firm])
@@ -293,7 +206,7 @@ def _search(
     """Return the modes of set-ups in a band."""
     set_ups, candidates, tops = [], [], []
     for group in groups:
-        set_up, found, top = _set_up(group, layout, band_hz, source, estimator)
+        set_up, found, top = _set_up(group, layout, band_hz, source, estimator, alone=len(groups) == 1)
         set_ups.append(set_up)
         candidates += found
         tops.append(top)
@@ -322,23 +235,39 @@ def _search(
 
 def _numbered(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
     """Return pole -> mode number (from 1): a complete set if there is one, else the largest one."""
-    chosen = complete_set(fit, layout)
-    return dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
+    # copies of poles have been left out before
+    chosen = complete_set(fit, layout, resolved=True)
+    if chosen:
+        return dict(zip(chosen, range(1, len(chosen) + 1), strict=True))
+    return largest_set(fit, layout, resolved=True)
 
 
 def _set_up(
-    tests: Sequence[FrameTest], layout: Layout, band_hz: tuple[float, float], source: Path, estimator: Estimator
+    tests: Sequence[FrameTest],
+    layout: Layout,
+    band_hz: tuple[float, float],
+    source: Path,
+    estimator: Estimator,
+    *,
+    alone: bool,
 ) -> tuple[SetUp, list[PoleCandidate], float]:
     """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
     records = _records(tests, layout, *band_hz)
     _require_length(records, tests, band_hz[0], source)
     orders = estimator.orders(layout.floors, len(tests[0].sensors))
-    statistics = [estimator.statistic(block, records) for block in records.blocks]
+    weights = block_weights(records.blocks) if _share_of(tests, records) < 1.0 else np.ones(len(records.blocks))
+    statistics = [
+        weight * estimator.statistic(block, records) for weight, block in zip(weights, records.blocks, strict=True)
+    ]
     poles = estimator.poles(np.mean(np.array(statistics), axis=0), records, orders)
-    clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
+    clusters = [item for item in clustered(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
     most = max((item.orders for item in clusters), default=0)
     firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
-    firm, doubtful = _without_copies(firm)
+    floors = [sensor.floor - 1 for sensor in tests[0].sensors]
+    masses = np.ones(len(floors)) if layout.masses is None else layout.masses[floors]
+    # with several set-ups, a pole that only one of them shows is not a mode, whatever its spectra show
+    peaks = partial(two_peaks, tests, [item.pole for item in firm]) if alone else lambda *_: False
+    firm, doubtful = without_copies(firm, np.sqrt(masses), peaks)
     if not firm:
         remedy = "record longer, or set identify_frame.band_high_hz"
         raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)
@@ -348,7 +277,18 @@ def _set_up(
     return SetUp(tuple(tests), fit, tuple(doubtful)), found, records.high_hz
 
 
-def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:
+def _share_of(tests: Sequence[FrameTest], records: Records) -> float:
+    """Return the least share of a test that counts, from all sensors in the band of the analysis."""
+    shares = []
+    for test in tests:
+        lines = np.fft.rfft(test.responses - test.responses.mean(axis=0), axis=0)
+        frequency = np.fft.rfftfreq(test.responses.shape[0], 1.0 / test.sampling_rate_hz)
+        inside = (frequency >= 0.5 * records.high_hz / _LARGEST_SPREAD) & (frequency <= records.high_hz)
+        shares.append(effective_share(list(lines[inside].T)))
+    return min(shares)
+
+
+def _response_at(tests: Sequence[FrameTest], firm: Sequence[Cluster]) -> FloatArray:
     """Return the spectral amplitude of the responses at the frequency of each cluster over the median, shape (r,)."""
     test = tests[0]
     length = int(min(test.responses.shape[0], 4096))

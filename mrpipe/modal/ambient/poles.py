@@ -19,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.search.selection import LARGEST_DAMPING
@@ -83,13 +84,14 @@ class SubspaceEstimator:
         return range(2 * floors, 2 * floors + 32, 2)
 
     def statistic(self, block: FloatArray, records: Records) -> FloatArray:
-        """Return the Hankel matrix of the correlation functions."""
-        from pyoma2.functions import ssi
+        """Return the Hankel matrix of the correlation functions, each divided by its own number of products.
 
-        # one lag between the two, because white noise of the sensors is correlated at lag zero only
-        with _quiet():
-            hankel, _ = ssi.build_hank(block[:, 1:], block[:, :-1], records.block_rows, "cov_R")
-        return np.asarray(hankel, dtype=np.float64)
+        pyOMA2 divides by a smaller number, which makes the correlation functions of a short block grow with the lag.
+        """
+        rows = records.block_rows
+        # white noise of the sensors is correlated at lag zero only
+        correlation = _correlation(block, 2 * rows - 1)
+        return np.vstack([np.hstack([correlation[:, :, i + j] for j in range(rows)]) for i in range(rows)])
 
     def poles(self, statistic: ComplexArray | FloatArray, records: Records, orders: Sequence[int]) -> list[Pole]:
         """Return the physical poles of the state matrices."""
@@ -103,7 +105,7 @@ class SubspaceEstimator:
             values, vectors = np.linalg.eig(state[order])
             poles = np.asarray(np.log(values.astype(np.complex128)) * records.rate_hz, dtype=np.complex128)
             shapes = np.asarray(output[order])[:channels] @ vectors
-            found += _physical(poles, shapes, order, records)
+            found += physical(poles, shapes, order, records)
         return found
 
 
@@ -120,16 +122,8 @@ class PolyreferenceEstimator:
 
         The correlation functions have no bias, because a taper of finite segments would add to the damping.
         """
-        sensors, samples = block.shape
         lags = _segment(records)
-        spectrum = np.fft.rfft(block, 2 * samples, axis=1)
-        # white noise of the sensors is correlated at lag zero only
-        count = samples - np.arange(1, lags + 1)
-        window = 0.01 ** (np.arange(lags) / lags)
-        correlation = np.empty((sensors, sensors, lags))
-        for reference in range(sensors):
-            whole = np.fft.irfft(spectrum * spectrum[reference].conj(), axis=1)
-            correlation[:, reference] = whole[:, 1 : lags + 1] / count * window
+        correlation = _correlation(block, lags) * 0.01 ** (np.arange(lags) / lags)
         return np.asarray(np.fft.rfft(correlation, axis=2), dtype=np.complex128)
 
     def poles(self, statistic: ComplexArray | FloatArray, records: Records, orders: Sequence[int]) -> list[Pole]:
@@ -146,12 +140,29 @@ class PolyreferenceEstimator:
             values, vectors = np.linalg.eig(state)
             kept = np.abs(values) > 0.0
             poles = np.log(values[kept].astype(np.complex128)) * records.rate_hz + window
-            found += _physical(np.asarray(poles), np.asarray(output @ vectors[:, kept]), order, records)
+            found += physical(np.asarray(poles), np.asarray(output @ vectors[:, kept]), order, records)
         return found
 
 
 ESTIMATORS: dict[str, Estimator] = {"ssi": SubspaceEstimator(), "plscf": PolyreferenceEstimator()}
 """Estimators by the name that the settings use."""
+
+
+def least_samples(block_rows: int) -> int:
+    """Return the least length of a block: the correlation functions reach to half of it."""
+    return 4 * block_rows
+
+
+def _correlation(block: FloatArray, lags: int) -> FloatArray:
+    """Return the correlation functions of the sensors at lags 1 to `lags`, shape (s, s, lags), without bias."""
+    sensors, samples = block.shape
+    padded = next_fast_len(samples + lags, real=True)
+    spectrum = np.fft.rfft(block, padded, axis=1)
+    correlation = np.empty((sensors, sensors, lags))
+    for reference in range(sensors):
+        whole = np.fft.irfft(spectrum * spectrum[reference].conj(), padded, axis=1)
+        correlation[:, reference] = whole[:, 1 : lags + 1] / (samples - np.arange(1, lags + 1))
+    return correlation
 
 
 def _segment(records: Records) -> int:
@@ -160,9 +171,20 @@ def _segment(records: Records) -> int:
     return 2 * int(min(wanted, shortest // 4) // 2)
 
 
-def _physical(
-    poles: NDArray[np.complex128], shapes: NDArray[np.complex128], order: int, records: Records
-) -> list[Pole]:
+def physical(poles: NDArray[np.complex128], shapes: NDArray[np.complex128], order: int, records: Records) -> list[Pole]:
+    """Return the poles inside the band with a plausible damping ratio.
+
+    Parameters
+    ----------
+    poles
+        Shape (p,) [rad/s].
+    shapes
+        Shape (s, p).
+    order
+        Model order.
+    records
+        For the band.
+    """
     found = []
     for pole, shape in zip(poles, shapes.T, strict=True):
         omega = float(abs(pole))

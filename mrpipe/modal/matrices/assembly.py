@@ -13,6 +13,7 @@ from mrpipe.modal.matrices.tridiagonal import TridiagonalFit, fit_partial, store
 from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel
 from mrpipe.modal.search.selection import Layout
 from mrpipe.structures import Frame, frame_from_modes, modal_damping_matrix, natural_modes, normalise_to_largest
+from mrpipe.words import noun
 
 _MODEL_ERROR = 0.02
 """Relative frequency error of the storey model above which the user is warned."""
@@ -185,8 +186,9 @@ def _findings(
     if missing:
         names = ", ".join(str(number) for number in missing)
         findings.append(
-            f"{len(updated.numbers)} of {layout.floors} modes were found; modes {names} are not determined by the "
-            "data: K is that of a storey model, and their damping is the mean of the others"
+            f"{len(updated.numbers)} of {layout.floors} modes were found; {noun(len(missing), 'mode')} {names} "
+            f"{'is' if len(missing) == 1 else 'are'} not determined by the data: K is that of a storey model, and "
+            f"{'its' if len(missing) == 1 else 'their'} damping is the mean of the others"
         )
     expanded = [row for row in unknown_rows if row not in open_rows]
     if open_rows:

@@ -8,6 +8,8 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.ambient.clocks import synchronised
+from mrpipe.modal.ambient.free_decays import find_decay_modes
+from mrpipe.modal.ambient.harmonics import without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.matrices.added_mass import modal_scale
@@ -98,10 +100,13 @@ def _of_added_masses(fit: MultiModeFit, tests: FrameTests, layout: Layout, optio
 def _modes(own: list[FrameTest], tests: FrameTests, layout: Layout, options: IdentificationOptions) -> MultiModeFit:
     """Return the modes of one state of the structure; masses are left out, because they have changed."""
     state = Layout(layout.floors, None, layout.is_chain)
-    forced = tuple(test for test in own if test.kind != "ambient")
+    forced = tuple(test for test in own if test.kind not in {"ambient", "free-decay"})
+    if not forced and all(test.kind == "free-decay" for test in own):
+        return find_decay_modes(own, state, options.band_low_hz, options.band_high_hz, tests.source).fit
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        moved, _ = synchronised(own, band, options)
+        quiet, _ = without_harmonics(own, options.band_low_hz)
+        moved, _ = synchronised(quiet, band, options)
         return find_ambient_modes(moved, state, *band, tests.source, options.ambient_method).fit
     alone = FrameTests(forced, (), np.full(layout.floors, np.nan), tests.source)
     chosen, _ = choose_tests(forced, alone, state, options)

@@ -140,11 +140,12 @@ def sign_ranges(fit: MultiModeFit, layout: Layout, tolerance: float = _SHAPE_TOL
     ]
 
 
-def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
+def complete_set(fit: MultiModeFit, layout: Layout, *, resolved: bool = False) -> tuple[int, ...]:
     """Return one pole for each floor; empty if no such set exists.
 
     The modes are the lowest poles of which each has one more sign change and that are orthogonal to the mass. The peak
     of a flexible support above the band has the shape of the highest mode, so the lowest possible choice is taken.
+    `resolved`: as for :func:`largest_set`.
     """
     if not layout.is_chain:
         return ()
@@ -168,7 +169,7 @@ def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
         found = extend(())
         if found:
             return found
-    poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]])
+    poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]], resolved=resolved)
     numbered = _numbered(fit, layout, poles, _SHAPE_TOLERANCE)
     return tuple(numbered) if len(numbered) == layout.floors else ()
 
@@ -202,7 +203,7 @@ def _numbered(
     return dict(best[-1][1])
 
 
-def _distinct(fit: MultiModeFit, layout: Layout, poles: Sequence[int]) -> list[int]:
+def _distinct(fit: MultiModeFit, layout: Layout, poles: Sequence[int], *, resolved: bool = False) -> list[int]:
     """Return the poles without those that have the shape of a stronger one: they are noise or another direction."""
     coupling, _, same = couplings(fit, layout)
     omega = fit.angular_frequencies
@@ -211,18 +212,23 @@ def _distinct(fit: MultiModeFit, layout: Layout, poles: Sequence[int]) -> list[i
     for index in sorted(poles, key=lambda i: -float(strength(fit)[i])):
         # with sensors on few floors different modes look alike: merge only neighbours in frequency
         rivals = [i for i in kept if not sampled or abs(omega[i] - omega[index]) < 0.05 * omega[index]]
+        rivals = [] if sampled and resolved else rivals
         if all(abs(coupling[index, other]) < same for other in rivals):
             kept.append(index)
     return sorted(kept)
 
 
-def largest_set(fit: MultiModeFit, layout: Layout, size: FloatArray | None = None) -> dict[int, int]:
+def largest_set(
+    fit: MultiModeFit, layout: Layout, size: FloatArray | None = None, *, resolved: bool = False
+) -> dict[int, int]:
     """Return pole -> mode number (from 1) for the largest set of poles that can be modes of the structure.
 
-    Of several largest sets that with the largest `size`, shape (r,), is taken; default: the strength of the poles.
+    Of several largest sets that with the largest `size`, shape (r,), is taken; default: the strength of the poles. If
+    the poles are known to be `resolved` from each other, those of equal shape count as two, unless the floor masses
+    contradict this.
     """
     may = usable(fit)
-    poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]])
+    poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]], resolved=resolved)
     if not layout.is_chain:
         return {pole: number for number, pole in enumerate(poles, start=1)}
     numbered = _numbered(fit, layout, poles, _LOOSE_TOLERANCE, size)

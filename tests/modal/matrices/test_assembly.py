@@ -57,6 +57,8 @@ def test_missing_modes_are_named_and_get_the_mean_damping() -> None:
     assert np.linalg.norm(found.frame.stiffness - FRAME.stiffness) < 0.01 * np.linalg.norm(FRAME.stiffness)
     assert complex_modes(found.frame).damping_ratios == pytest.approx([0.004, 0.006, 0.008, 0.006], rel=0.02)
     assert "2 of 4 modes were found; modes 2, 4 are not determined" in found.findings[0]
+    one = _assembled(_modes(numbers=(1, 2, 3)), MASSES).findings[0]
+    assert "mode 4 is not determined by the data" in one and "its damping is the mean" in one
 
 
 def test_unknown_masses_follow_from_the_measured_force() -> None:
