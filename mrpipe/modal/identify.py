@@ -20,6 +20,7 @@ from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_part
 from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
+from mrpipe.modal.loggers import aligned
 from mrpipe.modal.mode_finding import find_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
@@ -218,8 +219,13 @@ def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[Se
     """Return the forced tests with corrected delays of their sensors, also those that were not fitted."""
     fitted = {test.name: test for test in chosen.tests}
     others = [test for test in forced if test.name not in fitted]
-    delays = expected_clocks(clocks, chosen.tests, others)
-    return tuple(fitted[test.name] if test.name in fitted else corrected(test, delays) for test in forced)
+    # a test that was not fitted has delays of its own only where its loggers are far apart
+    own = [item for item in clocks if item.test not in fitted]
+    known = {item.test for item in own}
+    delays = expected_clocks(clocks, chosen.tests, [test for test in others if test.name not in known])
+    return tuple(
+        fitted[test.name] if test.name in fitted else aligned(corrected(test, delays), own) for test in forced
+    )
 
 
 def _measured_rows(fit: MultiModeFit, layout: Layout, rigid: RigidShapes | None) -> tuple[FloatArray, FloatArray]:

@@ -179,15 +179,28 @@ def _left_out(found: _Coherency, band: np.ndarray) -> _Coherency:
     return _Coherency(found.omega[keep], found.squared[:, :, keep], found.first, found.second, found.time)
 
 
-def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list[SensorClock]:
-    """Return the delays of the sensors of an ambient test, as far as its responses confirm them.
+def largest_reach_s(test: FrameTest) -> float:
+    """Return the largest delay [s] that the coherency of a test determines without ambiguity.
+
+    Lines of segments of length T are 1/T apart, and the phase of the squared coherency is twice that of the delay.
+    """
+    length = test.responses.shape[0] // _CHUNKS // _SEGMENTS
+    return 0.25 * length / test.sampling_rate_hz
+
+
+def ambient_clocks(
+    test: FrameTest, low_hz: float, high_hz: float = 0.0, *, reach_s: float | None = None
+) -> list[SensorClock]:
+    """Return the delays of the sensors of a test, as far as its responses confirm them.
 
     Parameters
     ----------
     test
-        An ambient test.
+        An ambient test, or a forced one, whose excitation is then not used.
     low_hz, high_hz
         Band [Hz]; 0 for `high_hz`: the band in which the motions of the sensors are coherent.
+    reach_s
+        Largest delay between two sensors [s]; half a period of the lowest mode if left out.
     """
     sensors = len(test.sensors)
     if sensors < 2:
@@ -199,7 +212,7 @@ def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list
     if len(bands) < _BANDS:
         return []
     # a delay of more than half a period of the lowest mode would change the sign of its shape
-    reach = 0.5 / first
+    reach = 0.5 / first if reach_s is None else reach_s
     still = np.zeros(sensors)
 
     def estimate(data: _Coherency, drifts: bool) -> tuple[FloatArray, FloatArray]:
