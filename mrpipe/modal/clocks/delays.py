@@ -28,8 +28,6 @@ _SCAN_PHASE = 1.0
 """Step of the scan over constant delays: phase of the highest mode [rad]. Gauss-Newton converges from nearer."""
 _SCAN_STEPS = 16
 """Steps of the scan to each side."""
-_COMMON_REACH = 1.0 / 256.0
-"""Largest delay that all sensors share, over the length of the record."""
 _STEP_ITERATIONS = 1
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
@@ -144,22 +142,8 @@ def _minimise(
     return value, cost, spread
 
 
-def _common_delay(fits: Sequence[_SensorFit], highest: float) -> float:
-    """Return a delay that all sensors of a test share [s], if it is beyond the scan of a single sensor; else 0.
-
-    It is that of a logger of the excitation that was started by hand. One sensor alone has several minima; the sum over
-    the sensors has one.
-    """
-    step = _SCAN_PHASE / highest
-    steps = int(_COMMON_REACH * float(fits[0].time[-1]) / step)
-    delays = step * np.arange(-steps, steps + 1)
-    cost = np.sum([fit.scanned(delays) for fit in fits], axis=0)
-    best = float(delays[int(np.argmin(cost))])
-    return best if abs(best) > _SCAN_STEPS * step else 0.0
-
-
-def _constant_delay(fit: _SensorFit, highest: float, common: float = 0.0) -> tuple[FloatArray, float, FloatArray]:
-    """Return the constant delay, shape (1,), its cost, and its standard error; searched around `common` [s].
+def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, float, FloatArray]:
+    """Return the constant delay, shape (1,), its cost, and its standard error.
 
     The cost has several minima, about half a period of a strong mode apart, because real residues may have either
     sign. The minimum nearest to zero is replaced by another one only if that one predicts modes which were left out
@@ -167,7 +151,7 @@ def _constant_delay(fit: _SensorFit, highest: float, common: float = 0.0) -> tup
     """
     ones = np.ones(fit.time.size)
     offset, cost, spread = _minimise(fit, [ones], np.zeros(1))
-    delays = common + _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
+    delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
     start = delays[int(np.argmin(fit.scanned(np.asarray(delays))))]
     if abs(start - offset[0]) <= _SCAN_PHASE / highest or len(fit.left_out.rows) < 2:
         return offset, cost, spread
@@ -186,15 +170,13 @@ def _supported(fit: _SensorFit, better: float, worse: float, parameters: int) ->
     return bool(rows * np.log(worse / max(better, 1e-300)) > parameters * np.log(rows))
 
 
-def _sensor_clock(
-    fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float, common: float
-) -> SensorClock:
+def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float) -> SensorClock:
     """Return the delay of a sensor: none, constant, drifting or with a step.
 
     Each form must be better than the simpler ones on modes that were left out, and all lines must support it.
     """
     ones, time = np.ones(fit.time.size), fit.time
-    offset, cost, spread = _constant_delay(fit, highest, common)
+    offset, cost, spread = _constant_delay(fit, highest)
     best = SensorClock(name, sensor, 0.0, float(spread[0]))
     if len(fit.left_out.rows) < 2:
         return best
@@ -256,13 +238,11 @@ def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool =
         Whether a delay may have a step.
     """
     found = []
-    highest = float(fit.angular_frequencies[-1])
     modes = list(zip(fit.angular_frequencies, fit.damping_ratios, strict=True))
     for test, spectrum, measured, steady in zip(tests, fit.spectra, fit.measured, fit.steady, strict=True):
         variance = uniform_filter1d(np.abs(measured - steady) ** 2, _SMOOTHED_LINES, axis=0, mode="nearest")
         # lines with a very small residual must not dominate the fit
         variance = np.maximum(variance, 0.1 * np.median(variance, axis=0))
-        own: list[tuple[Sensor, _SensorFit]] = []
         for is_displacement in sorted(set(test.is_displacement)):
             problem = Problem([spectrum], len(modes), is_displacement)
             inputs = len(problem.inputs)
@@ -272,10 +252,9 @@ def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool =
             for column, sensor in enumerate(test.sensors):
                 if sensor.is_displacement == is_displacement:
                     weight = 1.0 / np.sqrt(np.maximum(variance[:, column], 1e-300))
-                    item = _SensorFit(test, spectrum, column, basis, weight, fit.angular_frequencies)
-                    own.append((sensor, item))
-        common = _common_delay([item for _, item in own], highest)
-        found += [_sensor_clock(item, test.name, sensor, steps, highest, common) for sensor, item in own]
+                    own = _SensorFit(test, spectrum, column, basis, weight, fit.angular_frequencies)
+                    highest = float(fit.angular_frequencies[-1])
+                    found.append(_sensor_clock(own, test.name, sensor, steps, highest))
     return found
 
 
