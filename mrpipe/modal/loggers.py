@@ -4,8 +4,8 @@ The fine search for clocks (:mod:`mrpipe.modal.clocks.delays`) starts from fitte
 highest mode. Loggers that a person starts by hand differ by more, and then the modes themselves are found wrongly: the
 response of one logger has another phase at each mode. The cross-spectrum of two sensors of a structure with real shapes
 is real at all frequencies, and so is that of a sensor and the excitation outside the peaks. Coherency therefore gives
-the delays without modes. Only delays of more than half a period at the top of the band are taken from it, because the fine
-search is more exact and handles all smaller ones.
+the delays without modes. Only delays of more than half a period at the top of the band are taken from it, because the
+fine search is more exact and handles all smaller ones.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.ambient.clocks import ambient_clocks, reach_s
 from mrpipe.modal.clocks.delays import SensorClock, corrected
+from mrpipe.modal.doubts import Doubt
 from mrpipe.modal.records import FrameTest, Place, Sensor
 from mrpipe.modal.search.forced_modes import bands_to_try
 
@@ -42,7 +43,9 @@ def far_clocks(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> tup
             # directions of a building may move independently, and then their cross-spectrum has no meaning
             continue
         top = bands_to_try([test], low_hz, high_hz)[-1][1]
-        own = {item.sensor: item for item in ambient_clocks(_with_excitation(test), low_hz, top, longest_s=reach_s(test))}
+        own = {
+            item.sensor: item for item in ambient_clocks(_with_excitation(test), low_hz, top, longest_s=reach_s(test))
+        }
         ground = own.get(_EXCITATION)
         late = ground if ground is not None and abs(ground.offset_s) > 0.5 / top else None
         for sensor in test.sensors:
@@ -102,14 +105,16 @@ def limit_findings(tests: Sequence[FrameTest], clocks: Sequence[SensorClock]) ->
     tests, clocks
         The tests, and the delays that were found.
     """
-    findings = []
+    findings: list[str] = []
     for test in tests:
         largest = reach_s(test)
         own = [item for item in clocks if item.test == test.name and abs(item.offset_s) > _NEAR_LIMIT * largest]
         if own:
             floors = ", ".join(f"{item.sensor.floor}{item.sensor.direction}" for item in own)
             findings.append(
-                f"test {test.name}: the delay of the sensors of floor {floors} is at the limit of the search (+-"
-                f"{largest:.2g} s) and may be larger: synchronise the loggers before the modes are used"
+                Doubt(
+                    f"test {test.name}: the delay of the sensors of floor {floors} is at the limit of the search (+-"
+                    f"{largest:.2g} s) and may be larger: synchronise the loggers before the modes are used"
+                )
             )
     return findings

@@ -55,7 +55,7 @@ def find_modes(
         band = (options.band_low_hz, options.band_high_hz)
         ambient, corrected = synchronised(tests.ambient, band, options)
         search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
-        findings = [*_ambient_findings(tests), *_clock_findings(corrected), *search.notes]
+        findings = [*_ambient_findings(tests), *clock_findings(corrected), *search.notes]
         return ChosenTests(search, ()), corrected, findings
     far = far_clocks(forced, options.band_low_hz, options.band_high_hz) if options.clock_correction else ()
     limits = limit_findings(forced, far)
@@ -69,7 +69,7 @@ def find_modes(
         progress(0.3, "clocks")
         chosen, clocks = with_clocks(chosen, tests, layout, options)
         clocks = tuple(added(far, clocks))
-        findings += _clock_findings(clocks)
+        findings += clock_findings(clocks)
         chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
     chosen = _completed(chosen, layout, options, progress)
     sharp = sharpened(chosen.search, chosen.tests)
@@ -102,7 +102,14 @@ def _ambient_findings(tests: FrameTests) -> list[str]:
     ]
 
 
-def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
+def clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
+    """Return a line for each test whose sensors have delays.
+
+    Parameters
+    ----------
+    clocks
+        The delays that were corrected.
+    """
     findings = []
     for name in dict.fromkeys(item.test for item in clocks):
         own = [item for item in clocks if item.test == name]

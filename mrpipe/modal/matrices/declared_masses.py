@@ -1,8 +1,8 @@
 """Declared floor masses against those that the same data give.
 
-For the right masses the modes are orthogonal. Where all floors have a sensor, orthogonality therefore gives the ratios of
-the masses, and the response to a measured force gives their common size. A wrong mass and a wrong gain g of the sensor
-of a floor have the same effect on orthogonality: the mass appears as m / g^2. Ground excitation separates the two,
+For the right masses the modes are orthogonal. Where all floors have a sensor, orthogonality therefore gives the ratios
+of the masses, and the response to a measured force gives their common size. A wrong mass and a wrong gain g of the
+sensor of a floor have the same effect on orthogonality: the mass appears as m / g^2. Ground excitation separates them,
 because the contributions of all modes to the absolute acceleration of a floor sum to one, and to g with a wrong gain.
 """
 
@@ -43,7 +43,7 @@ class MassCheck:
 
 @dataclass(frozen=True)
 class _Ratios:
-    """Masses of the data over declared ones: shape (n,), half width of the test and of the 95 % interval (logarithms)."""
+    """Masses of the data over declared ones, and half widths of the test and of the 95 % interval (logarithms)."""
 
     values: FloatArray
     limit: FloatArray
@@ -95,25 +95,23 @@ def _of(found: FloorMasses, declared: FloatArray, floors: int) -> _Ratios:
 
 def _relative(fit: MultiModeFit, layout: Layout, declared: FloatArray) -> _Ratios | None:
     """Return the ratios relative to the floor whose ratio is in the middle; None where the data do not give them."""
-    reference = 0
-    for _ in range(2):
+
+    def relative_to(reference: int) -> FloorMasses | None:
         known = np.full(declared.size, np.nan)
         known[reference] = declared[reference]
         found = masses_of(fit, layout, known, Scale())
-        if found is None or found.freedom < 1:
-            return None
-        values = found.masses / declared
-        # of an even number of floors the lower one of the two in the middle
-        middle = int(np.argsort(values)[(values.size - 1) // 2])
-        if middle == reference:
-            break
-        reference = middle
-    return _of(found, declared, declared.size)
+        return found if found is not None and found.freedom >= 1 else None
+
+    first = relative_to(0)
+    if first is None:
+        return None
+    # of an even number of floors the lower one of the two in the middle
+    values = first.masses / declared
+    found = relative_to(int(np.argsort(values)[(values.size - 1) // 2]))
+    return None if found is None else _of(found, declared, declared.size)
 
 
-def _common(
-    fit: MultiModeFit, layout: Layout, declared: FloatArray, scale: Scale, wrong: list[int]
-) -> _Ratios | None:
+def _common(fit: MultiModeFit, layout: Layout, declared: FloatArray, scale: Scale, wrong: list[int]) -> _Ratios | None:
     """Return a factor that all masses have in common, as ratios of equal value; None where it is one or unknown."""
     found = masses_of(fit, layout, np.full(declared.size, np.nan), scale)
     if found is None or found.freedom < 1:
@@ -145,7 +143,8 @@ def _gain(fit: MultiModeFit, layout: Layout, row: int) -> float:
 
 def _floor_text(row: int, ratios: _Ratios, gain: float) -> str:
     value, spread = float(ratios.values[row]), float(ratios.spread[row])
-    seen = f"floor {row + 1}: the orthogonality of the modes gives {100.0 * value:.1f} % (+-{100.0 * spread * value:.1f} %)"
+    percent = f"{100.0 * value:.1f} % (+-{100.0 * spread * value:.1f} %)"
+    seen = f"floor {row + 1}: the orthogonality of the modes gives {percent}"
     apparent = float(1.0 / np.sqrt(value))
     mass = f"the declared mass is {1.0 / value:.3g} times the true one"
     reads = f"its sensor reads {100.0 * apparent:.0f} % of the motion"
