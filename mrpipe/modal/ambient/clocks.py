@@ -27,6 +27,8 @@ _CHUNKS = 8
 """Number of parts of the record, from which a drift is estimated."""
 _SEGMENTS = 8
 """Number of segments of a part, from which the coherency is estimated."""
+_FORCED_SEGMENTS = 4
+"""Number of segments of a part of a forced test: a sweep excites a line in few segments, and long ones have more lines."""
 _BANDS = 10
 """Number of parts of the band with equal coherency; each is left out once."""
 _LEVEL = 0.01
@@ -72,13 +74,13 @@ class _Coherency:
 
 def _coherency(test: FrameTest, low_hz: float, high_hz: float, *, stationary: bool = True) -> _Coherency:
     rate, (samples, sensors) = test.sampling_rate_hz, test.responses.shape
-    length = samples // _CHUNKS
+    length, segments = samples // _CHUNKS, _SEGMENTS if stationary else _FORCED_SEGMENTS
     first, second = np.triu_indices(sensors, 1)
     squared, powers = [], []
     for chunk in range(_CHUNKS):
         values = test.responses[chunk * length : (chunk + 1) * length]
         frequency, _, parts = signal.stft(
-            values - values.mean(axis=0), fs=rate, nperseg=max(16, length // _SEGMENTS), axis=0, boundary=None
+            values - values.mean(axis=0), fs=rate, nperseg=max(16, length // segments), axis=0, boundary=None
         )
         inside = (frequency >= low_hz) & (frequency <= high_hz)
         found = coherency(parts[inside])
@@ -189,11 +191,11 @@ def _left_out(found: _Coherency, band: np.ndarray) -> _Coherency:
 
 
 def reach_s(test: FrameTest) -> float:
-    """Return the largest delay [s] that the coherency of a test determines without ambiguity.
+    """Return the largest delay [s] that the coherency of a forced test determines without ambiguity.
 
     Lines of segments of length T are 1/T apart, and the phase of the squared coherency is twice that of the delay.
     """
-    length = test.responses.shape[0] // _CHUNKS // _SEGMENTS
+    length = test.responses.shape[0] // _CHUNKS // _FORCED_SEGMENTS
     return 0.25 * length / test.sampling_rate_hz
 
 
