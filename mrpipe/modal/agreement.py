@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrpipe.artifacts import Progress
+from mrpipe.errors import UserError
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
 from mrpipe.modal.doubts import Doubt
 from mrpipe.modal.mode_finding import clock_findings, find_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTests
 from mrpipe.modal.search.chosen_tests import ChosenTests, training_first
+from mrpipe.modal.search.forced_modes import ModeSearch
+from mrpipe.modal.search.forced_modes import find_modes as search_modes
 from mrpipe.modal.search.selection import Layout
-from mrpipe.modal.search.sessions import PolesOfTests, difference, odd_tests, poles_of_tests, with_spread
+from mrpipe.modal.search.sessions import (
+    PolesOfTests,
+    difference,
+    odd_tests,
+    poles_of_searches,
+    poles_of_tests,
+    with_reach,
+    with_spread,
+)
 
 
 @dataclass(frozen=True)
@@ -79,21 +91,52 @@ def of_agreeing_tests(
         If no mode is found in the tests that agree.
     """
     names = [test.name for test in found.chosen.tests]
-    if found.poles is None or not found.poles.differ(range(len(names))):
+    poles = found.poles
+    apart = False
+    if poles is not None and len(found.chosen.search.numbers) < layout.floors:
+        # two peaks that do not overlap are two modes to a common search, and none of them fits all tests
+        alone = _alone(found.chosen, tests, layout, options)
+        apart = alone is not None
+        names, poles = (names, poles) if alone is None else alone
+    if poles is None or not poles.differ(range(len(names))):
         return None
-    odd = odd_tests(found.poles)
-    said = f"{difference(names, found.poles, odd)}: the structure or its temperature changed between the tests"
-    if odd:
-        left_out = {names[test] for test in odd}
-        forced = tuple(replace(test, role="validation") if test.name in left_out else test for test in tests.forced)
+    odd = odd_tests(poles)
+    said = f"{difference(names, poles, odd)}: the structure or its temperature changed between the tests"
+    if odd or apart:
+        out = [names[test] for test in (odd or range(1, len(names)))]
+        forced = tuple(replace(test, role="validation") if test.name in out else test for test in tests.forced)
         again = modes_of_tests(replace(tests, forced=forced), layout, options, progress)
-        again = replace(again, odd=tuple(names[test] for test in odd))
-        said += f"; {'it is' if len(odd) == 1 else 'they are'} left out of the fit"
+        again = replace(again, odd=tuple(out), differ=not odd)
+        if odd:
+            said += f"; {'it is' if len(odd) == 1 else 'they are'} left out of the fit"
+        else:
+            said += f"; the modes are those of test {names[0]}, and their intervals contain each test"
+            search = again.chosen.search
+            if search.fit.angular_frequencies.size == poles.modes:
+                again = replace(
+                    again, chosen=replace(again.chosen, search=replace(search, fit=with_reach(search.fit, poles)))
+                )
     else:
-        search = replace(found.chosen.search, fit=with_spread(found.chosen.search.fit, found.poles))
+        search = replace(found.chosen.search, fit=with_spread(found.chosen.search.fit, poles))
         again = replace(found, chosen=replace(found.chosen, search=search), differ=True)
         said += "; the modes are means of the tests, and their intervals contain each test"
     return replace(again, findings=(*again.findings, Doubt(said)))
+
+
+def _alone(
+    chosen: ChosenTests, tests: FrameTests, layout: Layout, options: IdentificationOptions
+) -> tuple[list[str], PolesOfTests] | None:
+    """Return the names and poles of tests that show more modes alone than together; None for fewer than two."""
+    found: dict[str, ModeSearch] = {}
+    for test in chosen.tests:
+        with suppress(UserError):
+            band = (options.band_low_hz, options.band_high_hz)
+            found[test.name] = search_modes((test,), layout, *band, tests.source, tests.decays)
+    numbers = max((item.numbers for item in found.values()), key=len, default=())
+    same = {name: item.fit for name, item in found.items() if item.numbers == numbers}
+    if len(numbers) <= len(chosen.search.numbers) or len(same) < 2:
+        return None
+    return list(same), poles_of_searches(list(same.values()))
 
 
 def without_weak_clocks(

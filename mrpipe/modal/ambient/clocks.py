@@ -28,7 +28,7 @@ _CHUNKS = 8
 _SEGMENTS = 8
 """Number of segments of a part, from which the coherency is estimated."""
 _FORCED_SEGMENTS = 4
-"""Number of segments of a part of a forced test: a sweep excites a line in few segments, and long ones have more lines."""
+"""The same for forced tests: a sweep excites a line in few segments, and long segments have more lines."""
 _BANDS = 10
 """Number of parts of the band with equal coherency; each is left out once."""
 _LEVEL = 0.01

@@ -22,6 +22,8 @@ from mrpipe.words import listed
 
 _LEVEL = 1e-3
 """Probability of an exchange that does not exist, over all orders that are tried."""
+_NAMING_LEVEL = 0.05
+"""Probability that another order than the best one is the true one, from which on no order is named."""
 _MOST_PERMUTED = 6
 """Largest number of floors for which all orders are tried; for more floors up to two exchanges are tried."""
 _MOST_FITTED = 24
@@ -33,6 +35,8 @@ def exchanged_floors(
 ) -> tuple[int, ...]:
     """Return the floor (from 1) at which each sensor probably is, lowest sensor first; empty where the order is right.
 
+    Zeros where the order is wrong and several others describe the modes equally well.
+
     Parameters
     ----------
     masses
@@ -43,19 +47,24 @@ def exchanged_floors(
         Shape (n,) [rad/s], rising.
     """
     declared = tuple(range(masses.size))
-    reversed_order = declared[::-1]
-    # reversed floors have the same numbers of sign changes, and only the storey model distinguishes them
-    tried = [reversed_order] if _is_possible(declared, shapes, errors) else _orders(masses.size)
-    possible = [order for order in tried if order == reversed_order or _is_possible(order, shapes, errors)]
+    if _is_possible(declared, shapes, errors):
+        # reversed floors have the same numbers of sign changes, and only the storey model distinguishes them
+        tried = possible = [declared[::-1]]
+    else:
+        tried = _orders(masses.size)
+        possible = [order for order in tried if _is_possible(order, shapes, errors)]
+    if not possible:
+        return ()
     possible.sort(key=_moved)
     costs = [storey_misfit(masses, shapes[list(order)], angular_frequencies) for order in possible[:_MOST_FITTED]]
     before = storey_misfit(masses, shapes, angular_frequencies)
-    limit = float(stats.f.ppf(1.0 - _LEVEL / len(tried), shapes.size, shapes.size))
-    least = limit * max(min(costs), shapes.size * np.finfo(float).eps)
-    if before <= least:
+    best = max(min(costs), shapes.size * np.finfo(float).eps)
+    if before <= best * float(stats.f.ppf(1.0 - _LEVEL / len(tried), shapes.size, shapes.size)):
         return ()
-    # of the orders that describe the modes equally well, the one with the fewest moved floors
-    chosen = next(order for order, cost in zip(possible, costs, strict=False) if cost <= least)
+    rivals = sum(cost <= best * float(stats.f.ppf(1.0 - _NAMING_LEVEL, shapes.size, shapes.size)) for cost in costs)
+    if rivals > 1:
+        return (0,) * masses.size
+    chosen = possible[int(np.argmin(costs))]
     # the motion of floor i is row `chosen[i]`, so that the sensor of this row is at floor i
     return tuple(int(place) + 1 for place in np.argsort(chosen))
 
@@ -96,6 +105,11 @@ def _swapped(rows: tuple[int, ...], pair: tuple[int, int]) -> tuple[int, ...]:
 
 def exchanged_finding(places: Sequence[int]) -> str:
     """Return a sentence on exchanged sensors; `places`: result of :func:`exchanged_floors`."""
+    if not all(places):
+        return (
+            "the sensors may be in another order than declared: springs between neighbouring floors do not allow the "
+            "sign changes of the mode shapes, and describe the modes in several other orders"
+        )
     moved = [(floor, place) for floor, place in enumerate(places, start=1) if floor != place]
     who = listed([str(floor) for floor, _ in moved])
     if tuple(places) == tuple(range(len(places), 0, -1)):

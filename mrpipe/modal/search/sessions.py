@@ -95,6 +95,18 @@ def poles_of_tests(fit: MultiModeFit) -> PolesOfTests | None:
     return PolesOfTests(np.array(values), np.array(errors))
 
 
+def poles_of_searches(fits: Sequence[MultiModeFit]) -> PolesOfTests:
+    """Return the poles of tests whose modes were searched in each test alone.
+
+    Parameters
+    ----------
+    fits
+        A fit of each test, with the same modes in the same order.
+    """
+    values = [np.log(np.concatenate([fit.angular_frequencies, fit.damping_ratios])) for fit in fits]
+    return PolesOfTests(np.array(values), np.array([np.sqrt(np.diag(fit.covariance)) for fit in fits]))
+
+
 def odd_tests(poles: PolesOfTests) -> tuple[int, ...] | None:
     """Return the tests (from 0) that contradict a majority of agreeing tests; None where no majority agrees."""
     kept = list(range(poles.values.shape[0]))
@@ -141,6 +153,14 @@ def with_spread(fit: MultiModeFit, poles: PolesOfTests) -> MultiModeFit:
         participations=renewed.participations,
         input_residues=renewed.input_residues,
     )
+
+
+def with_reach(fit: MultiModeFit, poles: PolesOfTests) -> MultiModeFit:
+    """Return the fit of some tests with errors whose 95 % intervals also contain the poles of the other tests."""
+    own = np.log(np.concatenate([fit.angular_frequencies, fit.damping_ratios]))
+    old = np.sqrt(np.diag(fit.covariance))
+    scale = 1.0 + np.abs(poles.values - own).max(axis=0) / _NORMAL_95 / old
+    return replace(fit, covariance=fit.covariance * np.outer(scale, scale), freedom=np.full(own.size, np.inf))
 
 
 def difference(names: Sequence[str], poles: PolesOfTests, odd: Sequence[int] | None) -> str:
