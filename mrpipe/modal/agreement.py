@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -11,13 +12,14 @@ from mrpipe.artifacts import Progress
 from mrpipe.errors import UserError
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
 from mrpipe.modal.doubts import Doubt
+from mrpipe.modal.matrices.exchanged import exchanged_finding, exchanged_floors
 from mrpipe.modal.mode_finding import clock_findings, find_modes
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.records import FrameTests
+from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.chosen_tests import ChosenTests, training_first
 from mrpipe.modal.search.forced_modes import ModeSearch
 from mrpipe.modal.search.forced_modes import find_modes as search_modes
-from mrpipe.modal.search.selection import Layout
+from mrpipe.modal.search.selection import Layout, all_floors_measured, floor_shapes
 from mrpipe.modal.search.sessions import (
     PolesOfTests,
     difference,
@@ -27,6 +29,9 @@ from mrpipe.modal.search.sessions import (
     with_reach,
     with_spread,
 )
+
+_CHANGED = "the structure or its temperature changed between the tests"
+_CONTAIN = "their intervals contain each test"
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,15 @@ def modes_of_tests(
     UserError
         If no mode is found.
     """
-    chosen, clocks, findings = find_modes(tests, training_first(tests.forced), layout, options, progress)
+    try:
+        chosen, clocks, findings = find_modes(tests, training_first(tests.forced), layout, options, progress)
+    except UserError:
+        # tests of two states may fit each other so badly that no sensor seems to respond
+        trained = tuple(test for test in tests.forced if test.role != "validation")
+        alone = _alone(trained, tests, layout, options, 0)
+        if alone is None or not alone[1].differ(range(len(alone[0]))):
+            raise
+        return _of_some(*alone, tests, layout, options, progress)
     poles = poles_of_tests(chosen.search.fit) if chosen.tests and options.modes_from == "fit" else None
     return ModesOfTests(chosen, clocks, tuple(findings), poles)
 
@@ -90,53 +103,93 @@ def of_agreeing_tests(
     UserError
         If no mode is found in the tests that agree.
     """
-    names = [test.name for test in found.chosen.tests]
-    poles = found.poles
-    apart = False
-    if poles is not None and len(found.chosen.search.numbers) < layout.floors:
+    names, poles = [test.name for test in found.chosen.tests], found.poles
+    number = len(found.chosen.search.numbers)
+    if poles is not None and number < layout.floors:
         # two peaks that do not overlap are two modes to a common search, and none of them fits all tests
-        alone = _alone(found.chosen, tests, layout, options)
-        apart = alone is not None
-        names, poles = (names, poles) if alone is None else alone
+        alone = _alone(found.chosen.tests, tests, layout, options, number)
+        if alone is not None and alone[1].differ(range(len(alone[0]))):
+            return _of_some(*alone, tests, layout, options, progress)
     if poles is None or not poles.differ(range(len(names))):
         return None
     odd = odd_tests(poles)
-    said = f"{difference(names, poles, odd)}: the structure or its temperature changed between the tests"
-    if odd or apart:
-        out = [names[test] for test in (odd or range(1, len(names)))]
-        forced = tuple(replace(test, role="validation") if test.name in out else test for test in tests.forced)
-        again = modes_of_tests(replace(tests, forced=forced), layout, options, progress)
-        again = replace(again, odd=tuple(out), differ=not odd)
-        if odd:
-            said += f"; {'it is' if len(odd) == 1 else 'they are'} left out of the fit"
-        else:
-            said += f"; the modes are those of test {names[0]}, and their intervals contain each test"
-            search = again.chosen.search
-            if search.fit.angular_frequencies.size == poles.modes:
-                again = replace(
-                    again, chosen=replace(again.chosen, search=replace(search, fit=with_reach(search.fit, poles)))
-                )
+    if odd:
+        return _of_some(names, poles, tests, layout, options, progress)
+    search = replace(found.chosen.search, fit=with_spread(found.chosen.search.fit, poles))
+    said = f"{difference(names, poles, odd)}: {_CHANGED}; the modes are means of the tests, and {_CONTAIN}"
+    return replace(
+        found, chosen=replace(found.chosen, search=search), differ=True, findings=(*found.findings, Doubt(said))
+    )
+
+
+def _of_some(
+    names: list[str],
+    poles: PolesOfTests,
+    tests: FrameTests,
+    layout: Layout,
+    options: IdentificationOptions,
+    progress: Progress,
+) -> ModesOfTests:
+    """Return the modes of the majority of tests that agree, or of the first test with intervals for all."""
+    odd = odd_tests(poles)
+    out = [names[test] for test in (odd or range(1, len(names)))]
+    forced = tuple(replace(test, role="validation") if test.name in out else test for test in tests.forced)
+    again = modes_of_tests(replace(tests, forced=forced), layout, options, progress)
+    again = replace(again, odd=tuple(out), differ=not odd)
+    said = f"{difference(names, poles, odd)}: {_CHANGED}"
+    if odd:
+        said += f"; {'it is' if len(odd) == 1 else 'they are'} left out of the fit"
     else:
-        search = replace(found.chosen.search, fit=with_spread(found.chosen.search.fit, poles))
-        again = replace(found, chosen=replace(found.chosen, search=search), differ=True)
-        said += "; the modes are means of the tests, and their intervals contain each test"
+        search = again.chosen.search
+        if search.fit.angular_frequencies.size == poles.modes:
+            search = replace(search, fit=with_reach(search.fit, poles))
+        again = replace(again, chosen=replace(again.chosen, search=search))
+        said += f"; the modes are those of test {names[0]}, and {_CONTAIN}"
     return replace(again, findings=(*again.findings, Doubt(said)))
 
 
 def _alone(
-    chosen: ChosenTests, tests: FrameTests, layout: Layout, options: IdentificationOptions
+    trained: Sequence[FrameTest], tests: FrameTests, layout: Layout, options: IdentificationOptions, together: int
 ) -> tuple[list[str], PolesOfTests] | None:
-    """Return the names and poles of tests that show more modes alone than together; None for fewer than two."""
+    """Return names and poles of tests that show more modes alone than `together`; None for fewer than two."""
     found: dict[str, ModeSearch] = {}
-    for test in chosen.tests:
+    for test in trained if len(trained) > 1 else ():
         with suppress(UserError):
             band = (options.band_low_hz, options.band_high_hz)
             found[test.name] = search_modes((test,), layout, *band, tests.source, tests.decays)
     numbers = max((item.numbers for item in found.values()), key=len, default=())
     same = {name: item.fit for name, item in found.items() if item.numbers == numbers}
-    if len(numbers) <= len(chosen.search.numbers) or len(same) < 2:
+    if len(numbers) <= together or len(same) < 2:
         return None
     return list(same), poles_of_searches(list(same.values()))
+
+
+def order_findings(chosen: ChosenTests, tests: FrameTests, layout: Layout, options: IdentificationOptions) -> list[str]:
+    """Return a line if modes are missing because sensors are at other floors than declared; else nothing.
+
+    With exchanged sensors the shapes contradict orthogonality and the numbers of sign changes, so that the choice among
+    the poles leaves modes out. A search without these conditions gives all shapes.
+
+    Parameters
+    ----------
+    chosen
+        The modes that were found.
+    tests, layout, options
+        As for :func:`modes_of_tests`.
+    """
+    fit, floors = chosen.search.fit, layout.floors
+    if layout.masses is None or not chosen.tests or len(chosen.search.numbers) == floors:
+        return []
+    if not all_floors_measured(fit, layout):
+        return []
+    free = Layout(floors, None, is_chain=False)
+    with suppress(UserError):
+        band = (options.band_low_hz, options.band_high_hz)
+        every = search_modes(chosen.tests, free, *band, tests.source, tests.decays).fit
+        if every.angular_frequencies.size == floors:
+            places = exchanged_floors(layout.masses, *floor_shapes(every, free), every.angular_frequencies)
+            return [Doubt(exchanged_finding(places))] if places else []
+    return []
 
 
 def without_weak_clocks(

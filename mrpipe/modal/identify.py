@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
-from mrpipe.modal.agreement import ModesOfTests, modes_of_tests, of_agreeing_tests, without_weak_clocks
+from mrpipe.modal.agreement import ModesOfTests, modes_of_tests, of_agreeing_tests, order_findings, without_weak_clocks
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
 from mrpipe.modal.comparison import compare_with_tests
 from mrpipe.modal.decays.choice import LONGER_RECORDS, choose_damping, decays_of_modes
@@ -140,7 +140,13 @@ def _identify(
     if given is not None:
         _check_given(given, tests.floor_masses)
     found = modes_of_tests(tests, layout, options, progress)
-    result = _completed(tests, layout, options, progress, given, found)
+    try:
+        result = _completed(tests, layout, options, progress, given, found)
+    except UserError:
+        again = of_agreeing_tests(found, tests, layout, options, progress)
+        if again is None:
+            raise
+        return _completed(tests, layout, options, progress, given, again)
     if result.amplitude is None:
         again = of_agreeing_tests(found, tests, layout, options, progress)
     else:
@@ -176,6 +182,8 @@ def _completed(
         assembly = assemble_rigid(fit, rigid, zeta, tests.floor_masses, tests.inertias, axis)
         notes = list(assembly.findings)
     findings += notes
+    order = order_findings(chosen, tests, layout, options)
+    findings += order
     progress(0.75, "verification")
     shown = _shown(training_first(tests.forced), chosen, clocks)
     positions = None if rigid is None else tests.positions
@@ -185,7 +193,7 @@ def _completed(
     changes = found.differ or compared.amplitude is not None
     findings += [note.removesuffix(LONGER_RECORDS) if changes else note for note in damping_notes]
     is_certain = not any(isinstance(note, Doubt) for note in notes)
-    unsound = assembly.exchanged or any(test.is_clipped for test in chosen.tests)
+    unsound = assembly.exchanged or bool(order) or any(test.is_clipped for test in chosen.tests)
     masses = None if unsound else check_declared_masses(fit, layout, scale, with_scale=is_certain)
     findings += [] if masses is None else [Doubt(line) for line in masses.findings]
     doubted = masses is not None and bool(masses.findings)
@@ -200,7 +208,7 @@ def _completed(
         shape_errors=errors_of_rows(assembly.shapes, *_measured_rows(fit, layout, rigid)),
         decays=damping.decays,
         fit=fit,
-        tridiagonal=assembly.storeys,
+        tridiagonal=None if order else assembly.storeys,
         in_time=compared.in_time,
         in_frequency=compared.in_frequency,
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),

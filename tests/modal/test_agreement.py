@@ -75,5 +75,15 @@ def test_delays_below_the_error_of_laws_over_amplitude_are_left_out() -> None:
     assert without_weak_clocks(steady, 0.1, tests, LAYOUT, OPTIONS, no_progress) is None
 
 
+def test_exchanged_sensors_that_hide_a_mode_are_named() -> None:
+    test = _test("a", 1)
+    swapped = replace(test, responses=test.responses[:, [0, 2, 1]])
+    for mass in (1.0, 0.4):
+        masses = MASSES * np.array([1.0, 1.0, mass])
+        result = identify_frame(replace(_tests(swapped), floor_masses=masses), OPTIONS)
+        assert any("floors 2 and 3 may be exchanged" in item for item in result.doubts)
+        assert result.tridiagonal is None
+
+
 def test_a_doubt_is_a_sentence() -> None:
     assert Doubt("a sensor is late") == "a sensor is late"
