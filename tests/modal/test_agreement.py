@@ -16,7 +16,7 @@ from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.selection import Layout
-from mrpipe.structures import complex_modes
+from mrpipe.structures import complex_modes, shear_frame
 from tests.modal.rig import Rig, random_frame, sweep_test
 
 pytestmark = pytest.mark.planted
@@ -75,14 +75,16 @@ def test_delays_below_the_error_of_laws_over_amplitude_are_left_out() -> None:
     assert without_weak_clocks(steady, 0.1, tests, LAYOUT, OPTIONS, no_progress) is None
 
 
-def test_exchanged_sensors_that_hide_a_mode_are_named() -> None:
-    test = _test("a", 1)
+@pytest.mark.parametrize("top", [6.0, 3.0])
+def test_exchanged_sensors_are_named_also_where_they_hide_a_mode(top: float) -> None:
+    frame = shear_frame([6.0, 6.0, top], [6000.0, 5500.0, 5000.0], 0.01)
+    test = sweep_test(frame, np.random.default_rng(1), Rig(noise=0.01, rate=100.0, sweep_s=80.0))
     swapped = replace(test, responses=test.responses[:, [0, 2, 1]])
-    for mass in (1.0, 0.4):
-        masses = MASSES * np.array([1.0, 1.0, mass])
-        result = identify_frame(replace(_tests(swapped), floor_masses=masses), OPTIONS)
-        assert any("floors 2 and 3 may be exchanged" in item for item in result.doubts)
-        assert result.tridiagonal is None
+    result = identify_frame(replace(_tests(swapped), floor_masses=np.diag(frame.mass)), OPTIONS)
+    assert any("floors 2 and 3 may be exchanged" in item for item in result.doubts)
+    assert result.tridiagonal is None
+    right = identify_frame(replace(_tests(test), floor_masses=np.diag(frame.mass)), OPTIONS)
+    assert right.tridiagonal is not None and right.doubts == ()
 
 
 def test_a_doubt_is_a_sentence() -> None:
