@@ -46,6 +46,7 @@ from mrpipe.structures import (
     natural_modes,
     normalise_to_largest,
 )
+from mrpipe.words import listed
 
 _LOOSE_SIGNS = 0.03
 
@@ -168,6 +169,9 @@ def _completed(
     chosen, clocks, fit = found.chosen, found.clocks, found.chosen.search.fit
     findings = [*found.findings, *tests.notes, *_shape_findings(chosen.search, layout)]
     findings += _check_coherence(fit, tests) if tests.forced else []
+    clipped = listed([test.name for test in chosen.tests if test.is_clipped])
+    if clipped:
+        findings.append(Doubt(f"test {clipped}: shapes and damping ratios may be wrong because sensors are clipped"))
     progress(0.5, "decays")
     damping, damping_notes = _damping(tests, fit, options)
     progress(0.6, "matrices")
