@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.amplitude.law_fit import AmplitudeDependence
+from mrpipe.modal.amplitude.dependence import AmplitudeDependence
 from mrpipe.modal.clocks.delays import SensorClock
 from mrpipe.modal.decays.decay import DecayResult, Estimate
 from mrpipe.modal.fit.lscf import PoleCandidate
@@ -59,6 +59,8 @@ class FrameIdentification:
         Band of the fit.
     findings
         Messages for the user, one line each.
+    doubts
+        Those findings because of which the structure may be wrong.
     numbers
         Mode number (from 1) of each mode.
     clocks
@@ -101,6 +103,7 @@ class FrameIdentification:
     mass_intervals: FloatArray
     amplitude: AmplitudeDependence | None = None
     amplitude_in_time: tuple[TimeVerification, ...] = ()
+    doubts: tuple[str, ...] = ()
     shape_errors: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 

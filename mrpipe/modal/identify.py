@@ -10,17 +10,21 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
+from mrpipe.modal.agreement import ModesOfTests, modes_of_tests, of_agreeing_tests, order_findings, without_weak_clocks
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
 from mrpipe.modal.comparison import compare_with_tests
-from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
+from mrpipe.modal.decays.choice import LONGER_RECORDS, choose_damping, decays_of_modes
 from mrpipe.modal.decays.decay import DecayResult, Estimate
+from mrpipe.modal.doubts import Doubt
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.identification import FrameIdentification, GivenShapes, errors_of_rows
-from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
+from mrpipe.modal.loggers import aligned
+from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial, storey_model_findings
+from mrpipe.modal.matrices.declared_masses import check_declared_masses
+from mrpipe.modal.matrices.exchanged import exchanged_finding, exchanged_floors
 from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
-from mrpipe.modal.mode_finding import find_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes, reversed_finding
@@ -42,6 +46,7 @@ from mrpipe.structures import (
     natural_modes,
     normalise_to_largest,
 )
+from mrpipe.words import listed
 
 _LOOSE_SIGNS = 0.03
 
@@ -72,7 +77,7 @@ def _check_shapes(shapes: FloatArray, mass: FloatArray, given: GivenShapes | Non
         return []
     message = "; ".join(item.message for item in found)
     if given is None:
-        return [f"measured mode shapes: {message}"]
+        return [Doubt(f"measured mode shapes: {message}")]
     wrong = [item for item in found if item.kind in {"wrong-sign", "singular"}]
     remedy = (
         "change the sign of those elements" if wrong and wrong[0].elements else "give shapes orthogonal to the mass"
@@ -136,13 +141,40 @@ def _identify(
     layout = _layout(tests)
     if given is not None:
         _check_given(given, tests.floor_masses)
-    chosen, clocks, findings = find_modes(tests, training_first(tests.forced), layout, options, progress)
-    fit = chosen.search.fit
-    findings += [*tests.notes, *_shape_findings(chosen.search, layout)]
+    found = modes_of_tests(tests, layout, options, progress)
+    try:
+        result = _completed(tests, layout, options, progress, given, found)
+    except UserError:
+        again = of_agreeing_tests(found, tests, layout, options, progress)
+        if again is None:
+            raise
+        return _completed(tests, layout, options, progress, given, again)
+    if result.amplitude is None:
+        again = of_agreeing_tests(found, tests, layout, options, progress)
+    else:
+        # laws over amplitude explain why tests differ, and a part of what looked like delays
+        left = float(np.sqrt(np.mean(result.amplitude.error)))
+        again = without_weak_clocks(found, left, tests, layout, options, progress)
+    return result if again is None else _completed(tests, layout, options, progress, given, again)
+
+
+def _completed(
+    tests: FrameTests,
+    layout: Layout,
+    options: IdentificationOptions,
+    progress: Progress,
+    given: GivenShapes | None,
+    found: ModesOfTests,
+) -> FrameIdentification:
+    """Return the structure that follows from the modes, and its comparison with the tests."""
+    chosen, clocks, fit = found.chosen, found.clocks, found.chosen.search.fit
+    findings = [*found.findings, *tests.notes, *_shape_findings(chosen.search, layout)]
     findings += _check_coherence(fit, tests) if tests.forced else []
+    clipped = listed([test.name for test in chosen.tests if test.is_clipped])
+    if clipped:
+        findings.append(Doubt(f"test {clipped}: shapes and damping ratios may be wrong because sensors are clipped"))
     progress(0.5, "decays")
-    damping, notes = _damping(tests, fit, options)
-    findings += notes
+    damping, damping_notes = _damping(tests, fit, options)
     progress(0.6, "matrices")
     scale, notes = find_scale(fit, tests, layout, options)
     findings += notes
@@ -155,11 +187,21 @@ def _identify(
         assembly = assemble_rigid(fit, rigid, zeta, tests.floor_masses, tests.inertias, axis)
         notes = list(assembly.findings)
     findings += notes
+    order = order_findings(chosen, tests, layout, options)
+    findings += order
     progress(0.75, "verification")
     shown = _shown(training_first(tests.forced), chosen, clocks)
     positions = None if rigid is None else tests.positions
-    compared, notes = compare_with_tests(assembly.frame, shown, chosen, positions, options, progress)
+    compared, notes = compare_with_tests(assembly.frame, shown, chosen, positions, options, progress, found.odd)
     findings += notes
+    # more data of a structure that is not the same in all tests do not make its damping more certain
+    changes = found.differ or compared.amplitude is not None
+    findings += [note.removesuffix(LONGER_RECORDS) if changes else note for note in damping_notes]
+    is_certain = not any(isinstance(note, Doubt) for note in notes)
+    unsound = assembly.exchanged or bool(order) or any(test.is_clipped for test in chosen.tests)
+    masses = None if unsound else check_declared_masses(fit, layout, scale, with_scale=is_certain)
+    findings += [] if masses is None else [Doubt(line) for line in masses.findings]
+    doubted = masses is not None and bool(masses.findings)
     return FrameIdentification(
         frame=assembly.frame,
         frequencies=damping.frequencies,
@@ -171,19 +213,20 @@ def _identify(
         shape_errors=errors_of_rows(assembly.shapes, *_measured_rows(fit, layout, rigid)),
         decays=damping.decays,
         fit=fit,
-        tridiagonal=assembly.storeys,
+        tridiagonal=None if order else assembly.storeys,
         in_time=compared.in_time,
         in_frequency=compared.in_frequency,
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),
         tests=compared.tests,
         band_hz=chosen.search.band_hz,
-        findings=tuple(findings),
+        findings=tuple(map(str, findings)),
+        doubts=tuple(str(line) for line in findings if isinstance(line, Doubt)),
         numbers=assembly.numbers,
         clocks=clocks,
         candidates=chosen.search.candidates,
         degrees_of_freedom=_names(fit, layout) if rigid is None else rigid.names,
         masses=assembly.masses,
-        mass_intervals=assembly.mass_intervals,
+        mass_intervals=masses.intervals if masses is not None and doubted else assembly.mass_intervals,
         amplitude=compared.amplitude,
         amplitude_in_time=compared.amplitude_in_time,
     )
@@ -194,7 +237,7 @@ def _shape_findings(search: ModeSearch, layout: Layout) -> list[str]:
     if not layout.is_chain or search.numbers[0] != 1:
         return []
     shapes, errors = floor_shapes(search.fit, layout)
-    return reversed_finding(shapes[:, 0], errors[:, 0])
+    return [Doubt(line) for line in reversed_finding(shapes[:, 0], errors[:, 0])]
 
 
 def _damping(tests: FrameTests, fit: MultiModeFit, options: IdentificationOptions) -> tuple[_Damping, list[str]]:
@@ -222,8 +265,11 @@ def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[Se
     """Return the forced tests with corrected delays of their sensors, also those that were not fitted."""
     fitted = {test.name: test for test in chosen.tests}
     others = [test for test in forced if test.name not in fitted]
-    delays = expected_clocks(clocks, chosen.tests, others)
-    return tuple(fitted[test.name] if test.name in fitted else corrected(test, delays) for test in forced)
+    # a test that was not fitted has delays of its own only where its loggers are far apart
+    own = [item for item in clocks if item.test not in fitted]
+    known = {item.test for item in own}
+    delays = expected_clocks(clocks, chosen.tests, [test for test in others if test.name not in known])
+    return tuple(fitted[test.name] if test.name in fitted else aligned(corrected(test, delays), own) for test in forced)
 
 
 def _measured_rows(fit: MultiModeFit, layout: Layout, rigid: RigidShapes | None) -> tuple[FloatArray, FloatArray]:
@@ -270,6 +316,7 @@ def _assemble(
     if options.orthogonal_shapes and given is None and not findings:
         shapes = orthogonal_shapes(measured, mass, np.linalg.norm(errors, axis=0) / np.linalg.norm(measured, axis=0))
     shapes = normalise_to_largest(shapes)
+    places = exchanged_floors(layout.masses, measured, errors, fit.angular_frequencies) if given is None else ()
     storeys = fit_tridiagonal(mass, shapes, fit.angular_frequencies)
     frame = frame_from_modes(
         shapes, fit.angular_frequencies, zeta, layout.masses, name="identified", source=tests.source
@@ -280,7 +327,12 @@ def _assemble(
     if storeys.at_bound:
         findings.append(f"tri-diagonal fit: storey {storeys.at_bound[0]} ended at its bound")
     intervals = np.column_stack([layout.masses, layout.masses])
-    return Assembly(frame, shapes, search.numbers, storeys, layout.masses, intervals, ()), findings
+    if places:
+        findings.append(Doubt(exchanged_finding(places)))
+    else:
+        findings += storey_model_findings(storeys, search.numbers, "K follows from the modes instead")
+    assembly = Assembly(frame, shapes, search.numbers, storeys, layout.masses, intervals, ())
+    return replace(assembly, storeys=None if places else storeys, exchanged=bool(places)), findings
 
 
 def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale) -> PartialModes:

@@ -12,8 +12,9 @@ from mrpipe.modal.ambient.clocks import synchronised
 from mrpipe.modal.ambient.free_decays import find_decay_modes
 from mrpipe.modal.ambient.harmonics import harmonic_findings, without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
-from mrpipe.modal.clocks.delays import SensorClock
+from mrpipe.modal.clocks.delays import SensorClock, added
 from mrpipe.modal.fit.own_residues import with_own_residues
+from mrpipe.modal.loggers import aligned, far_clocks, limit_findings
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, with_clocks, without_complex
@@ -37,8 +38,8 @@ def find_modes(
     tests
         All tests of the frame.
     forced
-        Forced tests, those for training first. Without forced tests, the modes come from the ambient tests, and
-        without these from the free decays.
+        Forced tests, those for training first. Sensors whose clocks are far from the others are aligned before the
+        search. Without forced tests, the modes come from the ambient tests, and without these from the free decays.
     layout
         Number of floors and how the sensors stand on them.
     options
@@ -61,16 +62,21 @@ def find_modes(
         ambient, corrected = synchronised(quiet, band, options)
         search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
         findings = [*_ambient_findings(tests), *harmonic_findings(harmonics)]
-        findings += [*_clock_findings(corrected), *search.notes]
+        findings += [*clock_findings(corrected), *search.notes]
         return ChosenTests(search, ()), corrected, findings
+    far = far_clocks(forced, options.band_low_hz, options.band_high_hz) if options.clock_correction else ()
+    limits = limit_findings(forced, far)
+    forced = tuple(aligned(test, far) for test in forced)
     chosen, findings = choose_tests(forced, tests, layout, options)
+    findings += limits
     if tests.ambient:
         findings.append("ambient tests were not used, because forced tests determine the modes better")
     clocks: tuple[SensorClock, ...] = ()
     if options.clock_correction:
         progress(0.3, "clocks")
         chosen, clocks = with_clocks(chosen, tests, layout, options)
-        findings += _clock_findings(clocks)
+        clocks = tuple(added(far, clocks))
+        findings += clock_findings(clocks)
         chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
     chosen = _completed(chosen, layout, options, progress)
     sharp = sharpened(chosen.search, chosen.tests)
@@ -103,7 +109,14 @@ def _ambient_findings(tests: FrameTests) -> list[str]:
     ]
 
 
-def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
+def clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
+    """Return a line for each test whose sensors have delays.
+
+    Parameters
+    ----------
+    clocks
+        The delays that were corrected.
+    """
     findings = []
     for name in dict.fromkeys(item.test for item in clocks):
         own = [item for item in clocks if item.test == name]

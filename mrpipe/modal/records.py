@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.checks import clipped_share
 from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.campaigns.parts import in_unbroken_parts
@@ -72,6 +73,10 @@ class FrameTest:
         Floor (from 1) and known mass [kg] that was added to it in this test.
     note
         What the user should know of the part that is used; empty for none.
+    is_clipped
+        Whether a sensor reached its limit.
+    is_part
+        Whether the record begins in the middle of a recording, so that the structure moves at its first sample.
     """
 
     name: str
@@ -89,6 +94,8 @@ class FrameTest:
     direction: str = ""
     added_masses: tuple[tuple[int, float], ...] = ()
     note: str = ""
+    is_clipped: bool = False
+    is_part: bool = False
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
@@ -274,6 +281,8 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         direction=first.direction,
         added_masses=_added_masses(recording, source, n, {sensor.floor for sensor in sensors}),
         note=note,
+        is_clipped=any(clipped_share(recording.channels[name][part]) > 0.0 for name in sensors.values()),
+        is_part=part.start is not None and part.start > 0,
     )
 
 

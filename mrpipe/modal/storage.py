@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mrpipe.artifacts import ArtifactWriter, FloatArray
+from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.modal.clocks.delays import SensorClock
 from mrpipe.modal.decays.decay import DecayResult, Estimate
 from mrpipe.modal.identification import FrameIdentification
@@ -86,6 +86,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         ],
         "band_hz": list(result.band_hz),
         "findings": list(result.findings),
+        "doubts": list(result.doubts),
     }
 
 
@@ -143,6 +144,18 @@ def off_band_share(stiffness: FloatArray) -> float:
     n = stiffness.shape[0]
     outside = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) > 1
     return float(np.abs(stiffness[outside]).max() / np.abs(stiffness).max()) if outside.any() else 0.0
+
+
+def doubts_of(artifact: Artifact) -> list[str]:
+    """Return the findings because of which the structure of a frame.h5 may be wrong.
+
+    Parameters
+    ----------
+    artifact
+        frame.h5 of an identification or of a given structure, which has none.
+    """
+    summary = artifact.json("summary") if "summary" in artifact else {}
+    return [str(line) for line in summary.get("doubts", [])]
 
 
 def write_identification(artifact: ArtifactWriter, result: FrameIdentification) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.doubts import Doubt
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray
@@ -54,7 +55,10 @@ class TimeVerification:
 
 
 def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) -> TimeVerification:
-    """Simulate a forced test with its measured excitation from rest; compare inside the band (order 3, zero phase)."""
+    """Simulate a forced test with its measured excitation; compare inside the band (order 3, zero phase).
+
+    The simulation begins at rest, except for a part of a recording: its first motion is estimated from the responses.
+    """
     if test.excitation is None:
         raise ValueError("a simulation needs the excitation")
     rate = test.sampling_rate_hz
@@ -64,14 +68,37 @@ def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) 
     for place, values in test.inputs.items():
         response = linear_response(frame, values - values.mean(), 1.0 / rate, shaker_floor=place.floor)
         simulated += np.where(flags, response.displacement[:, rows], response.absolute_acceleration[:, rows])
+    if test.is_part:
+        simulated = simulated + _first_motion(frame, test, simulated, _band_pass(band_hz, rate))
     return compare_in_time(simulated, test, band_hz)
+
+
+def _first_motion(frame: Frame, test: FrameTest, simulated: FloatArray, sections: FloatArray) -> FloatArray:
+    """Return the free response, shape (m, s), that explains the difference from a simulation from rest best."""
+    rows = [sensor.floor - 1 for sensor in test.sensors]
+    flags = np.asarray(test.is_displacement)
+    still, dt = np.zeros(simulated.shape[0]), 1.0 / test.sampling_rate_hz
+    columns = []
+    for state in np.eye(2 * frame.floors):
+        response = linear_response(frame, still, dt, initial_state=state)
+        columns.append(np.where(flags, response.displacement[:, rows], response.absolute_acceleration[:, rows]))
+    free = np.stack(columns, axis=-1)
+    wanted = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0) - simulated, axis=0)
+    basis = signal.sosfiltfilt(sections, free, axis=0).reshape(-1, free.shape[-1])
+    size = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+    values = np.linalg.lstsq(basis / size, wanted.ravel(), rcond=1e-10)[0] / size
+    return np.asarray(free @ values)
+
+
+def _band_pass(band_hz: tuple[float, float], rate: float) -> FloatArray:
+    top = min(band_hz[1], 0.9 * 0.5 * rate)
+    return np.asarray(signal.butter(_FILTER_ORDER, [band_hz[0], top], btype="bandpass", fs=rate, output="sos"))
 
 
 def compare_in_time(simulated: FloatArray, test: FrameTest, band_hz: tuple[float, float]) -> TimeVerification:
     """Compare a simulated response, shape (m, s), with that of a test inside the band (order 3, zero phase)."""
     rate = test.sampling_rate_hz
-    top = min(band_hz[1], 0.9 * 0.5 * rate)
-    sections = signal.butter(_FILTER_ORDER, [band_hz[0], top], btype="bandpass", fs=rate, output="sos")
+    sections = _band_pass(band_hz, rate)
     measured = test.responses - test.responses.mean(axis=0)
     measured = np.asarray(signal.sosfiltfilt(sections, measured, axis=0))
     simulated = np.asarray(signal.sosfiltfilt(sections, simulated, axis=0))
@@ -161,7 +188,7 @@ def misfit_findings(
         Band of the verification.
     """
     lines = (_misfit(frame, test, item, band_hz) for test, item in zip(tests, found, strict=True))
-    return [line for line in lines if line]
+    return [Doubt(line) for line in lines if line]
 
 
 def _misfit(frame: Frame, test: FrameTest, found: TimeVerification, band_hz: tuple[float, float]) -> str:

@@ -24,11 +24,15 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_tested
     from mrpipe.effects.damper import damper_named
+    from mrpipe.modal.storage import doubts_of
     from mrpipe.reporting import calibrate as report
     from mrpipe.structures import floor_position, read_frame, storey_position
 
     settings = context.settings.calibrate
-    frame = read_frame(context.artifact("identify-frame"))
+    identified = context.artifact("identify-frame")
+    frame = read_frame(identified)
+    for doubt in doubts_of(identified):
+        context.warn(f"the structure of identify-frame may be wrong: {doubt}")
     damper = damper_named(settings.damper, {"identified": partial(context.artifact, "identify-damper")})
     _check_floor(settings.damper_floor, frame)
     place = storey_position if settings.damper_across_storey else floor_position

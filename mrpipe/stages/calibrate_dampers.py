@@ -27,12 +27,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.placed import calibrate_placed
     from mrpipe.control.placed_storage import accelerometers_of, placed_dampers, write_placed
     from mrpipe.dampers.model import read_tested
+    from mrpipe.modal.storage import doubts_of
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.several_rig import damper_model
     from mrpipe.structures import read_frame
 
     settings, entries = context.settings.calibrate, context.settings.structure.dampers
-    frame = read_frame(context.artifact("identify-frame"))
+    identified = context.artifact("identify-frame")
+    frame = read_frame(identified)
+    for doubt in doubts_of(identified):
+        context.warn(f"the structure of identify-frame may be wrong: {doubt}")
     dampers = [
         replace(item, gains={**settings.given(item.law), **(item.gains or {})})
         for item in placed_dampers(frame, entries, settings.target_mode)

@@ -45,3 +45,13 @@ def test_without_forced_tests_or_matrices_nothing_is_compared(chosen: ChosenTest
     shown = () if frame is not None else chosen.tests
     result, findings = compare_with_tests(frame, shown, chosen, None, OPTIONS, no_progress)
     assert result.tests == shown and result.in_time == () and result.in_frequency is None and not findings
+
+
+def test_clipped_tests_and_tests_of_another_state_say_nothing_of_the_structure(chosen: ChosenTests) -> None:
+    softer = replace(FRAME, stiffness=0.9 * FRAME.stiffness)
+    name = chosen.tests[0].name
+    _, findings = compare_with_tests(softer, chosen.tests, chosen, None, OPTIONS, no_progress, {name})
+    assert not findings
+    clipped = replace(chosen, tests=tuple(replace(test, is_clipped=True) for test in chosen.tests))
+    result, _ = compare_with_tests(softer, clipped.tests, clipped, None, OPTIONS, no_progress)
+    assert result.amplitude is None

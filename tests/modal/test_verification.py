@@ -52,3 +52,14 @@ def test_what_nothing_explains_is_told_without_a_cause() -> None:
     other = np.random.default_rng(2).permutation(test.responses.shape[0])
     [line] = findings(replace(test, responses=50.0 * test.responses[other]))
     assert "does not reproduce" in line
+
+
+def test_a_part_of_a_recording_is_simulated_from_its_first_motion() -> None:
+    test = shaken(0)
+    assert test.excitation is not None
+    # mode 1 is at its resonance there
+    cut = slice(int(0.12 * test.responses.shape[0]), None)
+    part = replace(test, excitation=test.excitation[cut], responses=test.responses[cut])
+    from_rest = verify_in_time(FRAME, part, BAND).fit_percent
+    settled = verify_in_time(FRAME, replace(part, is_part=True), BAND).fit_percent
+    assert from_rest.min() < 80.0 and settled.min() > 90.0

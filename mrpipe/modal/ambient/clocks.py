@@ -27,6 +27,8 @@ _CHUNKS = 8
 """Number of parts of the record, from which a drift is estimated."""
 _SEGMENTS = 8
 """Number of segments of a part, from which the coherency is estimated."""
+_FORCED_SEGMENTS = 4
+"""The same for forced tests: a sweep excites a line in few segments, and long segments have more lines."""
 _BANDS = 10
 """Number of parts of the band with equal coherency; each is left out once."""
 _LEVEL = 0.01
@@ -70,18 +72,27 @@ class _Coherency:
         return turned.real.sum(axis=1), -2.0 * (turned.imag @ self.omega)
 
 
-def _coherency(test: FrameTest, low_hz: float, high_hz: float) -> _Coherency:
+def _coherency(test: FrameTest, low_hz: float, high_hz: float, *, stationary: bool = True) -> _Coherency:
     rate, (samples, sensors) = test.sampling_rate_hz, test.responses.shape
-    length = samples // _CHUNKS
+    length, segments = samples // _CHUNKS, _SEGMENTS if stationary else _FORCED_SEGMENTS
     first, second = np.triu_indices(sensors, 1)
-    squared = []
+    squared, powers = [], []
     for chunk in range(_CHUNKS):
         values = test.responses[chunk * length : (chunk + 1) * length]
         frequency, _, parts = signal.stft(
-            values - values.mean(axis=0), fs=rate, nperseg=max(16, length // _SEGMENTS), axis=0, boundary=None
+            values - values.mean(axis=0), fs=rate, nperseg=max(16, length // segments), axis=0, boundary=None
         )
         inside = (frequency >= low_hz) & (frequency <= high_hz)
-        squared.append((coherency(parts[inside])[:, first, second] ** 2).T)
+        found = coherency(parts[inside])
+        if not stationary:
+            # where a sweep is at another frequency, a line contains only leakage, whose phase has no meaning
+            own = np.mean(np.abs(parts[inside]) ** 2, axis=2)
+            powers.append(own)
+            found = found * np.sqrt(own[:, :, None] * own[:, None, :])
+        squared.append((found[:, first, second] ** 2).T)
+    if not stationary:
+        power = np.mean(powers, axis=0)
+        squared = [item / np.maximum(power[:, first] * power[:, second], 1e-300).T for item in squared]
     time = (np.arange(_CHUNKS) + 0.5) * length / rate - 0.5 * samples / rate
     return _Coherency(2.0 * np.pi * frequency[inside], np.array(squared), first, second, time)
 
@@ -179,27 +190,40 @@ def _left_out(found: _Coherency, band: np.ndarray) -> _Coherency:
     return _Coherency(found.omega[keep], found.squared[:, :, keep], found.first, found.second, found.time)
 
 
-def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list[SensorClock]:
-    """Return the delays of the sensors of an ambient test, as far as its responses confirm them.
+def reach_s(test: FrameTest) -> float:
+    """Return the largest delay [s] that the coherency of a forced test determines without ambiguity.
+
+    Lines of segments of length T are 1/T apart, and the phase of the squared coherency is twice that of the delay.
+    """
+    length = test.responses.shape[0] // _CHUNKS // _FORCED_SEGMENTS
+    return 0.25 * length / test.sampling_rate_hz
+
+
+def ambient_clocks(
+    test: FrameTest, low_hz: float, high_hz: float = 0.0, *, longest_s: float | None = None
+) -> list[SensorClock]:
+    """Return the delays of the sensors of a test, as far as its responses confirm them.
 
     Parameters
     ----------
     test
-        An ambient test.
+        An ambient test, or a forced one, whose excitation is then not used.
     low_hz, high_hz
         Band [Hz]; 0 for `high_hz`: the band in which the motions of the sensors are coherent.
+    longest_s
+        Largest delay between two sensors [s]; half a period of the lowest mode if left out.
     """
     sensors = len(test.sensors)
     if sensors < 2:
         return []
     first = lowest_peak_hz([test], low_hz)
     high = high_hz or min(USABLE_BAND * test.sampling_rate_hz, common_motion_ends_hz(test, first))
-    found = _coherency(test, max(low_hz, 0.5 * first), high)
+    found = _coherency(test, max(low_hz, 0.5 * first), high, stationary=test.kind == "ambient")
     bands = _bands(found)
     if len(bands) < _BANDS:
         return []
     # a delay of more than half a period of the lowest mode would change the sign of its shape
-    reach = 0.5 / first
+    reach = 0.5 / first if longest_s is None else longest_s
     still = np.zeros(sensors)
 
     def estimate(data: _Coherency, drifts: bool) -> tuple[FloatArray, FloatArray]:

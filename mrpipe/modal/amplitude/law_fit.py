@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.amplitude.dependence import AmplitudeDependence, explains
 from mrpipe.modal.amplitude.laws import (
     AmplitudeLaws,
     AmplitudeModel,
@@ -37,27 +38,6 @@ _EVALUATIONS = 25
 _STEP = 1e-5
 _START_SOFTENING = 0.005
 _START_DAMPING = 0.3
-
-
-@dataclass(frozen=True)
-class AmplitudeDependence:
-    """Result of the cross-validation, and the model fitted to all records.
-
-    Attributes
-    ----------
-    model
-        Model with the best law.
-    left_out
-        Name of the part left out of each fit: a test, or a part of the only test.
-    constant_error, error
-        Squared error over squared response of the part left out, for each fit, with constant modes and with the best
-        law.
-    """
-
-    model: AmplitudeModel
-    left_out: tuple[str, ...]
-    constant_error: tuple[float, ...]
-    error: tuple[float, ...]
 
 
 class _Record:
@@ -336,7 +316,7 @@ def find_amplitude_dependence(fit: MultiModeFit, tests: Sequence[FrameTest]) -> 
         return None
     errors = {measure: _left_out(common, parts, measure, theta) for measure, theta in fits.items()}
     best = min(errors, key=lambda measure: float(np.mean(errors[measure])))
-    if best == "constant":
+    if best == "constant" or not explains(errors["constant"], errors[best]):
         return None
     names = tuple(record.name for record in parts)
     model = _model(_Problem(common, whole, best), fits[best])
@@ -382,19 +362,3 @@ def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArra
 
 def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
     return simulated(laws, record.forces, record.dt, record.initial)
-
-
-def amplitude_finding(result: AmplitudeDependence) -> str:
-    """Return one line for the user: the change of the modes over the measured amplitudes, and the gain of the laws."""
-    model = result.model
-    low, high = model.laws.at(model.smallest_m), model.laws.at(model.largest_m)
-    mode = int(np.argmax(np.abs(high[0] / low[0] - 1.0)))
-    seen = (
-        f"{omega[mode] / (2 * np.pi):.4g} Hz and {100 * zeta[mode]:.2g} % damping at {1e3 * reached[mode]:.2g} mm"
-        for (omega, zeta), reached in ((low, model.smallest_m), (high, model.largest_m))
-    )
-    before, after = (100.0 * np.sqrt(np.mean(values)) for values in (result.constant_error, result.error))
-    return (
-        f"modes depend on the amplitude: mode {mode + 1} from {' to '.join(seen)}; on data left out of the fit the RMS "
-        f"error falls from {before:.0f} to {after:.0f} % of the response"
-    )

@@ -13,6 +13,8 @@ from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.words import noun
 
 _NORMAL_95 = 1.959964
+LONGER_RECORDS = "; longer records, or more force on this mode, would reduce this interval"
+"""End of a finding on a wide interval, where only noise is its reason."""
 _WIDEST_DECAY_INTERVAL = 0.02
 _WIDE_INTERVAL = 0.1
 """Half width of the 95 % interval, relative to the damping ratio, above which a finding reports it."""
@@ -105,8 +107,8 @@ def choose_damping(
         if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
             percent = 100.0 * chosen[-1].half_width / chosen[-1].value
             findings.append(
-                f"mode {mode}: the records determine the damping ratio only within +-{percent:.0f} % (95 % interval); "
-                "longer records, or more force on this mode, would reduce this interval"
+                f"mode {mode}: the records determine the damping ratio only within +-{percent:.0f} % (95 % interval)"
+                f"{LONGER_RECORDS}"
             )
         if first is not None:
             apart = abs(first.value - second.value)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.doubts import Doubt
 from mrpipe.modal.matrices.completion import completed_shapes
 from mrpipe.modal.matrices.tridiagonal import TridiagonalFit, fit_partial, storeys_of
 from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel
@@ -77,6 +79,8 @@ class Assembly:
         Shape (n, 2) [kg].
     findings
         Quantities that are not determined, one line each.
+    exchanged
+        Whether sensors are probably at other floors than declared.
     """
 
     frame: Frame | None
@@ -86,6 +90,7 @@ class Assembly:
     masses: FloatArray
     mass_intervals: FloatArray
     findings: tuple[str, ...]
+    exchanged: bool = False
 
 
 def can_scale(masses: FloatArray, modes: PartialModes) -> bool:
@@ -181,14 +186,16 @@ def _findings(
     open_rows: list[int],
     orthogonal: bool,
 ) -> list[str]:
-    findings = []
+    findings: list[str] = []
     missing = sorted(set(range(1, layout.floors + 1)) - set(updated.numbers))
     if missing:
         names = ", ".join(str(number) for number in missing)
         findings.append(
-            f"{len(updated.numbers)} of {layout.floors} modes were found; {noun(len(missing), 'mode')} {names} "
-            f"{'is' if len(missing) == 1 else 'are'} not determined by the data: K is that of a storey model, and "
-            f"{'its' if len(missing) == 1 else 'their'} damping is the mean of the others"
+            Doubt(
+                f"{len(updated.numbers)} of {layout.floors} modes were found; {noun(len(missing), 'mode')} {names} "
+                f"{'is' if len(missing) == 1 else 'are'} not determined by the data: K is that of a storey model, and "
+                f"{'its' if len(missing) == 1 else 'their'} damping is the mean of the others"
+            )
         )
     expanded = [row for row in unknown_rows if row not in open_rows]
     if open_rows:
@@ -209,19 +216,35 @@ def _findings(
             + ("expanded by orthogonality to the mass" if orthogonal else "those of the storey model")
         )
     if updated.undetermined:
-        findings.append(f"the data do not determine {', '.join(updated.undetermined)} (interval wider than half)")
-    worst = float(np.abs(updated.frequency_error).max())
-    if worst > _MODEL_ERROR:
-        mode = updated.numbers[int(np.argmax(np.abs(updated.frequency_error)))]
-        instead = "K follows from the modes instead" if not missing else "K is therefore uncertain"
-        findings.append(
-            f"with springs between neighbouring floors alone the frequency of mode {mode} differs by "
-            f"{100.0 * worst:.1f} %; "
-            f"{instead}"
-        )
+        names = ", ".join(updated.undetermined)
+        findings.append(Doubt(f"the data do not determine {names} (interval wider than half)"))
+    instead = "K follows from the modes instead" if not missing else "K is therefore uncertain"
+    findings += storey_model_findings(storeys_of(updated), updated.numbers, instead)
     if modes.driven >= 0 and np.any(updated.mass_high > updated.mass_low):
         findings.append(f"unknown masses were scaled by {modes.scaled_by}")
     return findings
+
+
+def storey_model_findings(storeys: TridiagonalFit, numbers: Sequence[int], instead: str) -> list[str]:
+    """Return a line if springs between neighbouring floors do not give the measured frequencies; else nothing.
+
+    Parameters
+    ----------
+    storeys
+        The storey model.
+    numbers
+        Mode number (from 1) of each mode.
+    instead
+        Source of K, the end of the line.
+    """
+    error = np.abs(storeys.frequency_error)
+    if error.max() <= _MODEL_ERROR:
+        return []
+    mode = numbers[int(np.argmax(error))]
+    return [
+        f"with springs between neighbouring floors alone the frequency of mode {mode} differs by "
+        f"{100.0 * error.max():.1f} %; {instead}"
+    ]
 
 
 def _expanded(modes: PartialModes, model: FloatArray, index: FloatArray) -> FloatArray:

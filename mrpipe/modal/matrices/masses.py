@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 from mrpipe.artifacts import FloatArray
 
-_NORMAL_95 = 1.959964
+NORMAL_95 = 1.959964
 _LEAST_SHAPE_ERROR = 0.003
 """Relative error of a shape beyond noise: cross-talk and gains of the sensors."""
 _UNDETERMINED = 0.5
@@ -17,10 +17,22 @@ _UNDETERMINED = 0.5
 
 @dataclass(frozen=True)
 class FloorMasses:
-    """Masses of all floors and their 95 % intervals, shape (n,) and (n, 2) [kg]."""
+    """Masses of all floors.
+
+    Attributes
+    ----------
+    masses, intervals
+        Values and 95 % intervals, shape (n,) and (n, 2) [kg].
+    freedom
+        Number of equations minus number of unknown masses.
+    misfit
+        Sum of squares of the weighted equations over `freedom`; the intervals contain it where it is above one.
+    """
 
     masses: FloatArray
     intervals: FloatArray
+    freedom: int = 0
+    misfit: float = 1.0
 
 
 def masses_by_orthogonality(
@@ -66,12 +78,14 @@ def masses_by_orthogonality(
         return None
     found = lsq_linear(matrix, values, bounds=(1e-6 * typical, np.inf)).x
     rest = matrix @ found - values
-    variance = max(1.0, float(rest @ rest) / max(values.size - unknown.size, 1))
-    spread = _NORMAL_95 * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)) * variance)
+    freedom = values.size - unknown.size
+    misfit = float(rest @ rest) / max(freedom, 1)
+    variance = max(1.0, misfit)
+    spread = NORMAL_95 * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)) * variance)
     if np.any(spread > _UNDETERMINED * found):
         return None
     whole = given.copy()
     whole[unknown] = found
     intervals = np.column_stack([whole, whole])
     intervals[unknown] += np.outer(spread, [-1.0, 1.0])
-    return FloorMasses(whole, intervals)
+    return FloorMasses(whole, intervals, freedom, misfit)

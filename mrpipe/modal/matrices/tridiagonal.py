@@ -14,6 +14,9 @@ from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel, storey_m
 from mrpipe.structures import shear_stiffness
 
 _MOST_ASSIGNMENTS = 80
+FREQUENCY_ERROR = 1e-3
+SHAPE_ERROR = 2e-2
+BOUNDS = (1.0, 1e12)
 
 
 @dataclass(frozen=True)
@@ -67,9 +70,9 @@ def fit_tridiagonal(
     mode_shapes: FloatArray,
     angular_frequencies: FloatArray,
     *,
-    frequency_error: float = 1e-3,
-    shape_error: float = 2e-2,
-    bounds: tuple[float, float] = (1.0, 1e12),
+    frequency_error: float = FREQUENCY_ERROR,
+    shape_error: float = SHAPE_ERROR,
+    bounds: tuple[float, float] = BOUNDS,
 ) -> TridiagonalFit:
     """Fit storey stiffnesses to frequencies and shapes of all modes.
 
@@ -84,20 +87,36 @@ def fit_tridiagonal(
     bounds
         Of each storey [N/m].
     """
+    modes = _all_modes(mode_shapes, angular_frequencies, frequency_error, shape_error)
+    return storeys_of(_updated(mass, modes, bounds), bounds)
+
+
+def _all_modes(shapes: FloatArray, omega: FloatArray, frequency_error: float, shape_error: float) -> MeasuredModes:
+    rows, numbers = tuple(range(shapes.shape[0])), tuple(range(1, omega.size + 1))
+    return MeasuredModes(omega, shapes, rows, numbers, frequency_error=frequency_error, shape_error=shape_error)
+
+
+def _updated(mass: FloatArray, modes: MeasuredModes, bounds: tuple[float, float]) -> UpdatedModel:
     masses = np.diag(mass)
-    modes = MeasuredModes(
-        angular_frequencies,
-        mode_shapes,
-        tuple(range(masses.size)),
-        tuple(range(1, angular_frequencies.size + 1)),
-        frequency_error=frequency_error,
-        shape_error=shape_error,
-    )
-    start = np.clip(first_storeys(mass, mode_shapes, angular_frequencies, bounds), *bounds)
-    return storeys_of(update_model(storey_model(masses.size), masses, modes, start, bounds=bounds), bounds)
+    start = np.clip(first_storeys(mass, modes.shapes, modes.angular_frequencies, bounds), *bounds)
+    return update_model(storey_model(masses.size), masses, modes, start, bounds=bounds)
 
 
-def storeys_of(updated: UpdatedModel, bounds: tuple[float, float] = (1.0, 1e12)) -> TridiagonalFit:
+def storey_misfit(masses: FloatArray, mode_shapes: FloatArray, angular_frequencies: FloatArray) -> float:
+    """Return the sum of squares that :func:`fit_tridiagonal` leaves, in units of its usual errors.
+
+    Parameters
+    ----------
+    masses
+        Shape (n,) [kg].
+    mode_shapes, angular_frequencies
+        Shape (n, r), (r,) [rad/s].
+    """
+    modes = _all_modes(mode_shapes, angular_frequencies, FREQUENCY_ERROR, SHAPE_ERROR)
+    return _updated(np.diag(masses), modes, BOUNDS).cost
+
+
+def storeys_of(updated: UpdatedModel, bounds: tuple[float, float] = BOUNDS) -> TridiagonalFit:
     """Return an updated storey model as a fit of storeys."""
     storeys = updated.parameters
     low, high = (np.log(value) for value in bounds)

@@ -14,8 +14,8 @@ from mrpipe.words import listed
 LARGEST_COUPLING = 0.1
 _FLIPS = 3
 _SUSPECT_COUPLING = 0.05
-_SURE_ERRORS = 5.0
-_SURE_SHARE = 0.1
+SURE_ERRORS = 5.0
+SURE_SHARE = 0.1
 """The sign of an element of a shape is sure above so many standard errors and this share of the largest element."""
 
 
@@ -190,7 +190,7 @@ def reversed_finding(mode_shape: ArrayLike, error: ArrayLike) -> list[str]:
     """
     shape = np.asarray(mode_shape, dtype=np.float64)
     size = np.abs(shape)
-    sure = size > np.maximum(_SURE_ERRORS * np.asarray(error, dtype=np.float64), _SURE_SHARE * size.max())
+    sure = size > np.maximum(SURE_ERRORS * np.asarray(error, dtype=np.float64), SURE_SHARE * size.max())
     up, down = (np.flatnonzero(sure & (sign * shape > 0.0)) + 1 for sign in (1.0, -1.0))
     fewer = up if up.size < down.size else down
     if not fewer.size:

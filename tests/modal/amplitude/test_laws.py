@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.modal.amplitude.law_fit import amplitude_finding, find_amplitude_dependence
+from mrpipe.modal.amplitude.dependence import amplitude_finding
+from mrpipe.modal.amplitude.law_fit import find_amplitude_dependence
 from mrpipe.modal.amplitude.laws import AmplitudeLaws, simulated
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.records import FrameTest
