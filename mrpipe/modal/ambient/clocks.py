@@ -196,7 +196,7 @@ def reach_s(test: FrameTest) -> float:
     Lines of segments of length T are 1/T apart, and the phase of the squared coherency is twice that of the delay.
     """
     length = test.responses.shape[0] // _CHUNKS // _FORCED_SEGMENTS
-    return 0.25 * length / test.sampling_rate_hz
+    return float(0.25 * length / test.sampling_rate_hz)
 
 
 def ambient_clocks(

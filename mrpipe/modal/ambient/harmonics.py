@@ -133,7 +133,7 @@ def _local(spectrum: FloatArray) -> FloatArray:
     medians = np.array([np.median(spectrum[part], axis=0) for part in parts]) / np.log(2.0)
     logs = np.log(np.maximum(medians, 1e-300))
     places = np.arange(spectrum.shape[0])
-    return np.exp(np.column_stack([np.interp(places, middle, column) for column in logs.T]))
+    return np.asarray(np.exp(np.column_stack([np.interp(places, middle, column) for column in logs.T])))
 
 
 def _refined(values: FloatArray, rate: float, start_hz: float) -> float:
@@ -171,7 +171,7 @@ def _is_constant(values: FloatArray, rate: float, frequency_hz: float, candidate
     decay = 2.0 * longest / segments
     # the frequency of a mode may be any of the segments' lines, and was chosen among the candidates
     tried = candidates * sensors * segments
-    return tried * chance(share, segments, decay) < _LEVEL
+    return bool(tried * chance(share, segments, decay) < _LEVEL)
 
 
 def _amplitudes(values: FloatArray, rate: float, frequency_hz: float, segments: int) -> ComplexArray:
@@ -179,7 +179,7 @@ def _amplitudes(values: FloatArray, rate: float, frequency_hz: float, segments: 
     length = values.shape[0] // segments
     wave = np.exp(-2j * np.pi * frequency_hz * np.arange(segments * length) / rate)
     turned = (values[: segments * length] * wave[:, None]).reshape(segments, length, -1)
-    return np.einsum("t,mts->ms", np.sin(np.pi * (np.arange(length) + 0.5) / length), turned)
+    return np.asarray(np.einsum("t,mts->ms", np.sin(np.pi * (np.arange(length) + 0.5) / length), turned))
 
 
 def chance(share: float, segments: int, decay: float) -> float:

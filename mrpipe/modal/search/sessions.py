@@ -49,7 +49,7 @@ class PolesOfTests:
     @property
     def modes(self) -> int:
         """Number of modes r."""
-        return self.values.shape[1] // 2
+        return int(self.values.shape[1] // 2)
 
     def frequencies(self, kept: Sequence[int]) -> tuple[FloatArray, FloatArray]:
         """Return ln omega of some tests and its errors, shape (len(kept), r) each; infinite errors for hidden modes."""
