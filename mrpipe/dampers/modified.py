@@ -34,6 +34,10 @@ from mrpipe.dampers.plant import (
 MOST_ITERATIONS = 80
 """Numerical technique: most iterations for the motion of the inner element; usually about four are needed."""
 
+LEAST_VISCOSITY = 1e-9
+"""Numerical technique: least viscosity of the dashpot in series [N s/m]. An overshoot of the drive below zero may make
+both viscosities zero, and the motion of the inner element would then be a division by zero."""
+
 LAST_STEP = 1e-5
 """Numerical technique: last step of the iterations, relative to the yield displacement."""
 
@@ -109,7 +113,7 @@ def series_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt:
         state[0] = wire[DISPLACEMENT]
         state[1] = 0.0
         state[2] = 0.0
-    series_viscosity = max(parameters[3] + parameters[4] * wire[CURRENT], 0.0)
+    series_viscosity = max(parameters[3] + parameters[4] * wire[CURRENT], LEAST_VISCOSITY)
     yield_force = max(wire[YIELD_FORCE] * wire[RATE_YIELD], 0.0)
     viscosity = max(wire[VISCOSITY], 0.0)
     change = inner_increment(

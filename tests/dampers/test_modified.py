@@ -7,7 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mrpipe.artifacts import load_parameter_set
+from mrpipe.dampers import plant
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set, thesis_parameters
+from mrpipe.dampers.modified import series_step
 
 
 def _p4_equations(times, amplitude, omega, volts, numbers, thesis):
@@ -59,3 +61,13 @@ def test_the_chain_solves_p4_equations(volts, series_share):
     late = slice(50, None)
     error = np.sqrt(np.mean((force[late] - expected[late]) ** 2) / np.mean(expected**2))
     assert error < 2e-3
+
+
+@pytest.mark.property
+def test_a_drive_below_zero_that_leaves_no_viscosity_gives_a_finite_motion() -> None:
+    """A drive that lags by an oscillation undershoots zero; both viscosities were then zero (seed 52412)."""
+    wire, state = np.zeros(32), np.zeros(3)
+    wire[plant.CURRENT], wire[plant.DISPLACEMENT], wire[plant.VELOCITY] = -0.2, 1e-4, 0.1
+    wire[plant.YIELD_FORCE], wire[plant.RATE_YIELD], wire[plant.VISCOSITY] = 60.0, 1.0, 0.0
+    series_step(wire, state, np.array([1e-3, 0.05, 2.0, 270.0, 2700.0, 0.0]), 1e-3)
+    assert np.all(np.isfinite(wire)) and np.all(np.isfinite(state))
