@@ -106,6 +106,11 @@ class FrameSelection:
         """Whether the residual exceeds the noise by an amount that matters."""
         return self.groups.material(self.design.residual)
 
+    @property
+    def remaining(self) -> FloatArray:
+        """Weighted residual with the chosen effects, or that of the linear frame without any, shape (n, 2 b)."""
+        return self.residual if self.chosen else self.design.residual
+
     def share(self, residual: FloatArray) -> float:
         """Return the share of the excess over the noise that a fit explains."""
         return 1.0 - self.groups.excess(residual) / max(self.groups.excess(self.design.residual), 1e-12)

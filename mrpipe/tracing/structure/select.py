@@ -98,8 +98,7 @@ def _better(
 
 
 def _mean_square(selection: FrameSelection) -> float:
-    residual = selection.residual if selection.chosen else selection.design.residual
-    return float(np.mean(residual**2))
+    return float(np.mean(selection.remaining**2))
 
 
 def _with_declared(

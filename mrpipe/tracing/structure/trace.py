@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import NamingRules
@@ -134,7 +134,7 @@ def trace_frame(
 
 def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
     """Return the fault of a sensor that leaves nothing unexplained, where effects leave something."""
-    if not selection.structured or selection.share(_left(selection)) >= rules.named_share:
+    if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
         return None
     design = design_of("linear-frame", problem.training)
     fault = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
@@ -147,10 +147,6 @@ def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: Namin
     again = frame_problem(training, validation, problem.masses_kg, problem.rules)
     design = design_of("linear-frame", again.training)
     return None if groups_of(design, problem.rules).material(design.residual) else fault
-
-
-def _left(selection: FrameSelection) -> FloatArray:
-    return selection.residual if selection.chosen else selection.design.residual
 
 
 def _because_of(fault: SensorFault) -> str:
@@ -299,8 +295,7 @@ def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, floa
 
 
 def _worst_storey(selection: FrameSelection) -> int:
-    residual = selection.residual if selection.chosen else selection.design.residual
-    over = selection.groups.over(residual)
+    over = selection.groups.over(selection.remaining)
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
 
 
