@@ -152,6 +152,13 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
     return train(training_history(device, rng), spec, options, rng, jobs=jobs)
 
 
+def neural_inverse(
+    device: BinghamDevice, rng: np.random.Generator, *, hidden: int = 6, jobs: int = 1
+) -> ValidatedInverse:
+    """Train the inverse network and validate it; see :func:`train_inverse` for the parameters."""
+    return validated_inverse(device, train_inverse(device, rng, hidden=hidden, jobs=jobs))
+
+
 def validated_inverse(device: BinghamDevice, trained: Trained) -> ValidatedInverse:
     """Return the validation of Figure 6.1 (b) for a trained inverse.
 

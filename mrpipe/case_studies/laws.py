@@ -7,11 +7,20 @@ from dataclasses import replace
 from typing import Protocol
 
 from mrpipe.case_studies.lqg import SampledController
-from mrpipe.case_studies.run import Controller
+from mrpipe.case_studies.run import BinghamDevice, Controller
 from mrpipe.errors import UserError
 
 LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
 """VD, VDNS, FDNS with MR dampers; LQG with ideal actuators, and clipped on the MR dampers; constant voltages."""
+
+
+PASSIVE = ("passive-off", "passive-on")
+"""Laws with a constant voltage."""
+
+
+def constant_voltage(law: str, device: BinghamDevice) -> float:
+    """Return the voltage [V] of a law of :data:`PASSIVE`."""
+    return 0.0 if law == "passive-off" else device.highest_voltage
 
 
 def unknown_law(law: str, structure: str) -> UserError:
@@ -77,7 +86,7 @@ def controller_of(
         return Controller("lqg", "active", observer=observer)
     if law == "lqg-clipped":
         return replace(damper, law="lqg", observer=observer)
-    if law in ("passive-off", "passive-on"):
-        volts = 0.0 if law == "passive-off" else damper.device.highest_voltage
+    if law in PASSIVE:
+        volts = constant_voltage(law, damper.device)
         return Controller("constant", "bingham", voltage=volts, device=damper.device, dampers=damper.dampers)
     raise unknown_law(law, structure)

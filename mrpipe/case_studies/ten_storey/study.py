@@ -9,6 +9,7 @@ from joblib import Parallel, delayed
 
 from mrpipe.case_studies.gains import TwoComponent, exact_viscous, lowest_damping, two_component
 from mrpipe.case_studies.indices import FloorResponse, largest, ten_storey_indices
+from mrpipe.case_studies.laws import PASSIVE, constant_voltage
 from mrpipe.case_studies.model import BenchmarkModel, ModalModel, modal_model
 from mrpipe.case_studies.run import BinghamDevice, Controller, Realisation, Response, simulate
 from mrpipe.dampers.plant import Chain
@@ -81,7 +82,7 @@ def stiffness_share(law: str) -> float:
 def check_laws(laws: Sequence[str]) -> None:
     """Raise UserError if one of them is not a law of the frame."""
     for law in laws:
-        if law not in ("passive-off", "passive-on"):
+        if law not in PASSIVE:
             stiffness_share(law)
 
 
@@ -150,8 +151,8 @@ class TenStoreyStudy:
 
     def controller(self, law: str, variant: str, dampers: float = 1.0) -> Controller:
         """Return the controller of a law in a variant."""
-        if law in ("passive-off", "passive-on"):
-            volts = 0.0 if law == "passive-off" else self.device.highest_voltage
+        if law in PASSIVE:
+            volts = constant_voltage(law, self.device)
             return Controller("constant", "chain", voltage=volts, dampers=dampers, device=self.device, chain=self.chain)
         viscous, stiffness = self.gains.of(law)
         realisation: Realisation = {"ideal": "active", "clipped": "semi-active"}.get(variant, "chain")  # type: ignore[assignment]
