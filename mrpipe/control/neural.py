@@ -15,6 +15,7 @@ from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec, Network, lagged
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
+from mrpipe.signals.error_size import nrmse
 from mrpipe.structures import Frame, natural_modes
 
 _SETTINGS = NeuralReferenceSettings()
@@ -267,11 +268,11 @@ def _with_noise(history: History, options: ReferenceOptions, rng: np.random.Gene
 
 
 def _nrmse(network: Network, history: History) -> float:
-    errors, sizes = [], []
+    errors, targets = [], []
     past = network.features.past_values
     for index in range(len(history.names)):
         rows = lagged([history.record(index, "displacement"), history.record(index, "velocity")], past)
         target = history.record(index, "force")[past:]
         errors.append(network.predict(rows) - target)
-        sizes.append(target)
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2) / np.mean(np.concatenate(sizes) ** 2)))
+        targets.append(target)
+    return nrmse(np.concatenate(errors), np.concatenate(targets))
