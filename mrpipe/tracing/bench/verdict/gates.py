@@ -40,7 +40,7 @@ def errors_on_validation(
     """Return the errors on the validation tests, with the thresholds from the options of the tracing."""
     return on_validation(
         base, chosen, baseline, training, validation, options.rules.validation,
-        own_offsets=own_offsets, record_gain=options.record_gain,
+        noise_rules=options.rules.noise, own_offsets=own_offsets, record_gain=options.record_gain,
     )  # fmt: skip
 
 

@@ -11,7 +11,9 @@ from scipy import signal
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.noise.weights import _limit, sensor_deviation
+from mrpipe.tracing.bench.noise.weights import _limit, noise_variances, sensor_deviation
+from mrpipe.tracing.rules import NoiseRules
+from tests.tracing.bench.fits import plain_fit
 from tests.tracing.bench.rig import RATE, campaign
 
 
@@ -62,3 +64,16 @@ def test_noise_that_is_simulated_too_large_in_one_test_leaves_that_of_the_others
     assert _limit(residual, variance, test) == pytest.approx(0.9, abs=0.03)
     assert _limit(residual, 4.0 * np.ones(test.size), test) == pytest.approx(0.25, rel=0.05)
     assert _limit(residual, 0.5 * np.ones(test.size), test) == 1.0
+
+
+@pytest.mark.property
+def test_the_simulated_noise_follows_from_the_seed_of_the_rules() -> None:
+    found = plain_fit("none")
+    recordings = found.problem.recordings
+    force, motion = noise_variances(found, recordings, draws=1)
+    same, other = (noise_variances(found, recordings, NoiseRules(seed=seed), draws=1)[1] for seed in (0, 1))
+    np.testing.assert_array_equal(motion, same)
+    assert np.any(motion != other)
+    # another record of the same noise has about the same size
+    assert 0.5 < np.sum(other) / np.sum(motion) < 2.0
+    assert np.all(force > 0.0)
