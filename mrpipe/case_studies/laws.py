@@ -63,13 +63,13 @@ def controller_of(
     Parameters
     ----------
     law
-        Its name.
+        Name of the law.
     damper
         Controller with the MR damper and its inverse, whose law is replaced.
     gains, observer
-        Of the laws.
+        Gains of the laws, and the controller of LQG.
     structure
-        For messages, as in "the tower".
+        Name of the structure in messages, such as "the tower".
 
     Raises
     ------

@@ -33,7 +33,7 @@ class ReferenceOptions:
     amplitudes_m
         Amplitudes of the loops [m]; loops with amplitudes between them are used for verification.
     frequencies_hz
-        Of the loops.
+        Frequencies of the loops.
     rate_hz, past_values
         Sampling rate of the network [Hz], and number of past values of displacement and velocity in addition to the
         present ones.
@@ -89,7 +89,7 @@ class ReferenceNetwork:
         alpha_n_m
             Gain of FDNS that the network learned.
         amplitude_m, angular_frequency
-            Of the motion [m], [rad/s].
+            Amplitude and angular frequency of the motion [m], [rad/s].
         """
         H = equivalent_stiffness(lambda x, v: network_force(self.network, x, v), amplitude_m, angular_frequency)
         wanted = friction_stiffness(alpha_n_m)
@@ -129,7 +129,7 @@ def reference_options(
     Parameters
     ----------
     settings
-        Of the section `calibrate.neural`.
+        Settings of the section `calibrate.neural`.
     alpha_n_m
         Gain of FDNS.
     frame, modes

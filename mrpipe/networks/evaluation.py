@@ -234,7 +234,7 @@ class Judgement:
         Parameters
         ----------
         unit
-            Of the target.
+            Unit of the target.
         span
             Range of the target. Where it is given (drive of an inverse network) errors are also shown as a share of it,
             and relative errors are left out for groups whose target is constant within each test: the RMS of a drive

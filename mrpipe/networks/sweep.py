@@ -101,11 +101,11 @@ def sweep(
     candidates
         Candidates to compare.
     options
-        How.
+        Options of the sweep.
     seed
         Seed of the splits and the starts. The starts of a candidate depend on the candidate and the seed only.
     normalisation
-        Of inputs and target, see :mod:`mrpipe.networks.scaling`.
+        Normalisation of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Number of threads; the results do not depend on it.
     cache

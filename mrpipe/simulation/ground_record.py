@@ -46,7 +46,7 @@ def read_histories(
         PEER AT2, COSMOS or CSMIP V2, or a zip of them; else text or CSV: time [s] and one or more columns, numbers
         divided by blanks, commas or semicolons; lines that do not begin with a number are headers.
     unit
-        Of the columns of a text file.
+        Unit of the columns of a text file.
     channels
         Names or numbers (from 1) of the histories; empty: all columns of a text file, and the horizontal channels of
         a record with at most two.

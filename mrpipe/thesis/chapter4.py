@@ -118,7 +118,7 @@ def cycle_peaks(run: LoopRun) -> dict[str, float]:
     Parameters
     ----------
     run
-        Under harmonic excitation.
+        Run under harmonic excitation.
     """
     response, excitation = run.response, run.excitation
     first, last = excitation.steady_s
@@ -183,7 +183,7 @@ def chapter_4(bench: Bench, frame: Frame) -> Outcomes:
     Parameters
     ----------
     bench
-        What the closed loop is run with.
+        Structure, damper and controllers of the closed loop.
     frame
         The printed frame with the signs of its mode matrix corrected, for the closed forms.
     """

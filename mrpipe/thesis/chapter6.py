@@ -41,18 +41,18 @@ NO_DATA = (
 
 @dataclass(frozen=True)
 class CaseOptions:
-    """How the benchmark structures are run; the settings `benchmark` of the configuration.
+    """Options of the benchmark structures; the settings `benchmark` of the configuration.
 
     Attributes
     ----------
     isolation_damping_ratio, isolation_stiffness_share, isolation_lqg
-        Of the base-isolated building.
+        Settings of the base-isolated building.
     wind_stiffness_share, wind_lqg, wind_modes, tuned_mass_kg
-        Of the tower.
+        Settings of the tower.
     climate, wind_duration_s, wind_interval_s
-        Of the wind load.
+        Settings of the wind load.
     filter_rate
-        Of the voltage filter of P4 (24) [1/s].
+        Rate of the voltage filter of P4 (24) [1/s].
     """
 
     isolation_damping_ratio: float = 0.1
@@ -272,9 +272,9 @@ def chapter_6(frame: Frame, options: CaseOptions, progress: Progress) -> Outcome
     Parameters
     ----------
     frame
-        For the regulator of appendix E.
+        Frame of the regulator of appendix E.
     options
-        How the benchmark structures are run.
+        Options of the benchmark structures.
     progress
         Receives the share that is done.
     """

@@ -34,7 +34,7 @@ class IsolationGains:
     friction
         alpha of FDNS [N/m], by its energy-equivalent viscous damper (4.21) to (4.24).
     damping_ratio
-        What all three give the isolation modes.
+        Damping ratio that each of the three laws gives the isolation modes.
     """
 
     viscous: float
@@ -52,7 +52,7 @@ def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: f
     modal
         The building.
     ratio
-        Wanted damping ratio.
+        Damping ratio that both modes shall have.
     omega
         Frequency of the isolation [rad/s].
     scale
@@ -78,7 +78,7 @@ def isolation_gains(
     building, modal
         The building and all its modes.
     damping_ratio
-        Wanted of the two lowest modes.
+        Damping ratio that the two lowest modes shall have.
     stiffness_share
         Share of the isolation's stiffness that VDNS takes away.
     """
@@ -142,7 +142,7 @@ def isolation_lqg(
     building, modal
         The building and all its modes.
     weights
-        What the design weighs.
+        Weights of displacement, acceleration and force.
     """
     A, B = modal.state_matrix(), modal.input_matrix(modal.devices)
     regulated, measured = isolation_outputs(building, modal)

@@ -31,7 +31,7 @@ REASON = (
 """Why our figures differ from the printed ones."""
 
 STRUCTURE = "the base-isolated building"
-"""What messages call it."""
+"""Name of the structure in messages."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def isolation_study(
 
 @dataclass(frozen=True)
 class IsolationCase:
-    """One law under one motion."""
+    """Run of the building under one law and one motion."""
 
     motion: str
     law: str
@@ -172,7 +172,7 @@ def run_cases(
     motion
         Two components.
     laws
-        Of :data:`~mrpipe.case_studies.laws.LAWS`.
+        Names of laws of :data:`~mrpipe.case_studies.laws.LAWS`.
     jobs
         Threads: the compiled loop runs free of the interpreter.
     """

@@ -30,14 +30,14 @@ VARIANTS = ("filtered", "unfiltered", "ideal", "clipped")
 
 @dataclass(frozen=True)
 class TenStoreyGains:
-    """What the laws are set to.
+    """Gains of the laws, and the limits from which they follow.
 
     Attributes
     ----------
     limits
-        Of the two-component reduction.
+        Limits of the reduction to two components.
     storey_stiffness_n_m
-        k.
+        Stiffness k of a storey [N/m].
     modal
         Limiting frequencies and modal flexibility of the target mode.
     """
@@ -88,7 +88,7 @@ def check_laws(laws: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class TenStoreyCase:
-    """One run.
+    """Run of the frame under one law in one variant.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class TenStoreyCase:
     absolute
         J2 and J4 with absolute accelerations.
     response
-        Histories.
+        Histories of the run.
     """
 
     law: str
@@ -165,7 +165,7 @@ class TenStoreyStudy:
     def case(
         self, law: str, variant: str = "filtered", dampers: float = 1.0, ratio: int | None = None
     ) -> TenStoreyCase:
-        """Run one law."""
+        """Run one law and return its indices."""
         response = self.run(self.controller(law, variant, dampers), ratio)
         free = self.uncontrolled if ratio in (None, self.ratio) else self.run(Controller(), ratio)
         relative = ten_storey_indices(floors(response), floors(free))
@@ -173,7 +173,7 @@ class TenStoreyStudy:
         return TenStoreyCase(law, variant, relative, {key: absolute[key] for key in ("J2", "J4")}, response)
 
     def run(self, controller: Controller, ratio: int | None = None) -> Response:
-        """Run the frame."""
+        """Run the frame under the motion with a controller."""
         loads = self.motion.acceleration_m_s2[:, :1]
         return simulate(self.modal, loads, self.motion.interval_s, controller, ratio=ratio or self.ratio)
 

@@ -41,7 +41,8 @@ class WindGains:
     friction
         alpha of FDNS [N/m].
     damping_ratio
-        Of the first mode under ideal VD, complex eigenvalue; for a tuned mass the smaller of its two modes.
+        Damping ratio of the first mode under ideal VD, from the complex eigenvalue; with a tuned mass the smaller one
+        of the two lowest modes.
     capacity_share
         Factor on the optimal gains of VD that reduces them to the force of the dampers.
     """
@@ -135,9 +136,9 @@ def wind_lqg(modal: ModalModel, weights: LqgWeights, load: WindLoad) -> tuple[Sa
     modal
         The tower's kept modes.
     weights
-        What the design weighs: floor displacements and accelerations.
+        Weights of floor displacements and accelerations.
     load
-        Its variance sets the disturbance.
+        Wind load, whose variance is that of the disturbance.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def noise_variances(
     recordings
         Tests laid end to end.
     rules
-        Their `seed` is that of the simulated noise; their defaults if None.
+        Rules whose `seed` is that of the simulated noise; their defaults if None.
     draws
         Number of simulated noise records.
     """
@@ -183,8 +183,8 @@ def _limit(residual: FloatArray, variance: FloatArray, test: IntArray) -> float:
     of all other tests, and the mean of the limits of the tests takes its place. The mean alone would be too small,
     because noise is above its expected power in some tests and below it in others.
     """
-    together = float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300)
-    return max(min(1.0, together), float(np.mean(noise_limits(residual, variance, test)[test])))
+    overall = float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300)
+    return max(min(1.0, overall), float(np.mean(noise_limits(residual, variance, test)[test])))
 
 
 def noise_limits(residual: FloatArray, variance: FloatArray, test: IntArray, tests: int = 0) -> FloatArray:

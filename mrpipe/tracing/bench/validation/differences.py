@@ -147,7 +147,7 @@ class Comparison:
     Attributes
     ----------
     differences
-        How validation tests differ.
+        Differences between the validation tests and the training tests.
     comparable
         Samples within the range of the training tests, of tests without a difference of gain, lag or offset, shape
         (n,).

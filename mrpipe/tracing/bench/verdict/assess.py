@@ -68,7 +68,7 @@ class Assessment:
     named
         The named terms of the model with their evidence, in their order.
     causes
-        What the verdict names, with probabilities: the named terms, and an offset between tests.
+        The causes that the verdict names, with probabilities: the named terms, and an offset between tests.
     further
         Terms of the model whose cause is not proven.
     missing
@@ -98,7 +98,7 @@ def assess(
     case: Case,
     rng: np.random.Generator,
     *,
-    several: bool = False,
+    with_others: bool = False,
     doubts: Sequence[Named] = (),
 ) -> Assessment:
     """Return the probability of each named effect and further term, the errors on validation, and the verdict.
@@ -111,7 +111,7 @@ def assess(
         Data that do not change.
     rng
         Source of randomness.
-    several
+    with_others
         Whether more than one effect had a name before some of them became further terms. The remaining ones then keep
         the lower probability of an effect that is not alone.
     doubts
@@ -139,11 +139,13 @@ def assess(
     judgement = verdict_on_validation(
         alone, proven, case.training, options, causes, missing, found.reason, case.ordered, case.jobs
     )
-    several = several or len(named) > 1
+    with_others = with_others or len(named) > 1
     evidence = judgement.evidence
     beyond = evidence.structured and evidence.after > options.rules.validation.noise_floors * evidence.floor
     likely = tuple(
-        with_calibrated_probability(item, judgement, options, several=several, beyond=beyond, chosen=item in named)
+        with_calibrated_probability(
+            item, judgement, options, with_others=with_others, beyond=beyond, chosen=item in named
+        )
         for item in causes
     )
     known = {item.effect.name: item for item in doubts}
@@ -151,7 +153,7 @@ def assess(
     unproven = tuple(
         replace(item, confidence=known[item.effect.name].confidence)
         if item.effect.name in known
-        else with_calibrated_probability(item, judgement, options, several=True, beyond=True)
+        else with_calibrated_probability(item, judgement, options, with_others=True, beyond=True)
         for item in further
     )
     return Assessment(named, likely, unproven, missing, errors, alone, judgement)
@@ -174,7 +176,7 @@ def with_likely_names(found: NamedEffects, case: Case, rng: np.random.Generator)
         Source of randomness.
     """
     assessed = assess(found, case, rng)
-    several = len(assessed.named) > 1
+    with_others = len(assessed.named) > 1
     doubts: list[Named] = []
     while (numbers := _unlikely(assessed, case.options)) or assessed.further_terms_fail:
         if numbers:
@@ -183,7 +185,7 @@ def with_likely_names(found: NamedEffects, case: Case, rng: np.random.Generator)
             found = replace(found, reason="" if found.selection.proven else _unlikely_reason(doubts))
         else:
             found = replace(found, selection=found.selection.with_named_alone)
-        assessed = assess(found, case, rng, several=several, doubts=doubts)
+        assessed = assess(found, case, rng, with_others=with_others, doubts=doubts)
     return found, assessed
 
 

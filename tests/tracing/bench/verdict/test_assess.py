@@ -51,8 +51,8 @@ def test_the_names_that_stay_are_judged_again_when_another_one_goes(monkeypatch:
     chosen = fit_with_terms("accumulator", ("inertia", "mass"), ("accumulator", "linear"))
     likely = [(0.9, 0.3), (0.15,), ()]
 
-    def assess(found, case, rng, *, several=False, doubts=()):
-        assert several is (len(likely) < 3)
+    def assess(found, case, rng, *, with_others=False, doubts=()):
+        assert with_others is (len(likely) < 3)
         assert [item.confidence for item in doubts] == [0.3, 0.15][: 3 - len(likely)]
         terms = found.selection.chosen.problem.terms
         causes = [SimpleNamespace(effect=t.effect, confidence=c) for t, c in zip(terms, likely.pop(0), strict=False)]
