@@ -54,6 +54,24 @@ def test_the_floor_is_the_error_of_the_true_model(corner_hz: float, step_n: floa
     assert baseline.scale.cycles > 0
 
 
+@pytest.mark.planted
+def test_the_floor_under_a_model_that_lacks_an_effect_is_the_noise_and_not_the_error_of_the_model() -> None:
+    rng = np.random.default_rng(7)
+    planted = {test.name: test for test in campaign("accumulator")}
+    tests, errors = [], []
+    for test in (planted[item.name] for item in sine_tests()):
+        errors.append(coloured(10.0, 2.0, len(test.force_n), rng))
+        force = test.force_raw_n + errors[-1]
+        tests.append(replace(test, force_n=force, force_raw_n=force))
+    recordings = record_tests(tests, rate_hz=250.0)
+    baseline = fit_baseline(recordings, declared_base(recordings, "bouc-wen", 2, 1))
+    deviation = sensor_deviation(baseline.fit, recordings, baseline.scale)[recordings.used]
+    # 0.5 N of white noise is in the record already
+    noise = np.hypot(np.sqrt(np.mean(np.concatenate(errors) ** 2)), 0.5)
+    assert np.sqrt(np.mean(deviation**2)) == pytest.approx(noise, rel=0.1)
+    assert baseline.fit.chi_square > 5.0 * baseline.noise
+
+
 @pytest.mark.property
 def test_noise_that_is_simulated_too_large_in_one_test_leaves_that_of_the_others() -> None:
     """One limit for all tests made the noise of all a tenth of what the others show."""
