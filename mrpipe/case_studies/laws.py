@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.run import BinghamDevice, Controller
@@ -35,24 +34,27 @@ def require_known(laws: Sequence[str], structure: str) -> None:
             raise unknown_law(law, structure)
 
 
-class LawGains(Protocol):
-    """Gains of the laws with MR dampers."""
+@dataclass(frozen=True)
+class LawGains:
+    """Gains of the laws with MR dampers, and the damping ratio for which they were calibrated.
 
-    @property
-    def viscous(self) -> float:
-        """Viscosity of vd [N s/m]."""
+    Attributes
+    ----------
+    viscous
+        Viscosity c of vd [N s/m].
+    negative_stiffness, negative_viscous
+        Stiffness k_d [N/m] and viscosity c [N s/m] of vdns.
+    friction
+        Gain alpha of fdns [N/m].
+    damping_ratio
+        Damping ratio of the calibrated mode under ideal vd [1].
+    """
 
-    @property
-    def negative_stiffness(self) -> float:
-        """Stiffness of vdns [N/m]."""
-
-    @property
-    def negative_viscous(self) -> float:
-        """Viscosity of vdns [N s/m]."""
-
-    @property
-    def friction(self) -> float:
-        """Gain of fdns [N/m]."""
+    viscous: float
+    negative_stiffness: float
+    negative_viscous: float
+    friction: float
+    damping_ratio: float
 
 
 def controller_of(

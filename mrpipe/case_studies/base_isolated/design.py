@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
+from mrpipe.case_studies.laws import LawGains
 from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
@@ -19,29 +19,6 @@ from mrpipe.case_studies.lqg import (
 )
 from mrpipe.case_studies.model import ModalModel
 from mrpipe.case_studies.options import LqgWeights
-
-
-@dataclass(frozen=True)
-class IsolationGains:
-    """Gains of the collocated laws, the same along x and y.
-
-    Attributes
-    ----------
-    viscous
-        c of VD [N s/m].
-    negative_stiffness, negative_viscous
-        k_d [N/m] and c [N s/m] of VDNS.
-    friction
-        alpha of FDNS [N/m], by its energy-equivalent viscous damper (4.21) to (4.24).
-    damping_ratio
-        Damping ratio that each of the three laws gives the isolation modes.
-    """
-
-    viscous: float
-    negative_stiffness: float
-    negative_viscous: float
-    friction: float
-    damping_ratio: float
 
 
 def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: float) -> float:
@@ -70,8 +47,11 @@ def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: f
 
 def isolation_gains(
     building: IsolatedBuilding, modal: ModalModel, *, damping_ratio: float, stiffness_share: float
-) -> IsolationGains:
-    """Calibrate the laws on the isolation modes by complex eigenvalues.
+) -> LawGains:
+    """Calibrate the laws on the isolation modes by complex eigenvalues; the gains are the same along x and y.
+
+    Each of the three laws gives the two lowest modes the same damping ratio. FDNS is represented by its
+    energy-equivalent viscous damper (4.21) to (4.24).
 
     Parameters
     ----------
@@ -85,7 +65,7 @@ def isolation_gains(
     omega = 2.0 * np.pi / building.isolation_period_s
     critical = 2.0 * omega * building.model.total_mass_kg
     k = -stiffness_share * float(building.isolation_stiffness[0, 0])
-    return IsolationGains(
+    return LawGains(
         viscous=viscous_for_damping(modal, 0.0, damping_ratio, critical, modes=2),
         negative_stiffness=k,
         negative_viscous=viscous_for_damping(modal, k, damping_ratio, critical, modes=2),

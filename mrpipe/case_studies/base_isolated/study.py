@@ -9,10 +9,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.case_studies.base_isolated.design import IsolationGains, isolation_gains, isolation_lqg
+from mrpipe.case_studies.base_isolated.design import isolation_gains, isolation_lqg
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
-from mrpipe.case_studies.laws import controller_of
+from mrpipe.case_studies.laws import LawGains, controller_of
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -40,7 +40,7 @@ class IsolationStudy:
 
     building: IsolatedBuilding
     modal: ModalModel
-    gains: IsolationGains
+    gains: LawGains
     device: BinghamDevice
     network: Network | None
     observer: SampledController
