@@ -28,7 +28,7 @@ class Condition:
     drive_spread: float
 
     def like(self, other: Condition, largest_drive: float) -> bool:
-        """Whether another test repeats this one."""
+        """Return whether another test repeats this one."""
         return (
             abs(self.frequency - other.frequency) <= 0.08 * max(self.frequency, other.frequency)
             and abs(self.amplitude - other.amplitude) <= 0.08 * max(self.amplitude, other.amplitude)
