@@ -20,6 +20,7 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.base_forms.fits_of_forms import compared_fits_without_effects, on_all_tests
 from mrpipe.tracing.bench.base_forms.promotion import extension_of, winner_on_all_tests, with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race, race
@@ -125,7 +126,7 @@ def choose_model(
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
-        floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+        floor = rms(left) / training.force_rms
         base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
         declared_fit = fit_baseline(
             training, base, declared, model_error_share=floor, rules=options.rules.noise, known=known
