@@ -22,9 +22,9 @@ class UserError(MrpipeError):
     where
         Key, row, column or test within it; empty where the whole source is meant.
     problem
-        What is wrong.
+        A clause that says what is wrong.
     remedy
-        What would be right.
+        A clause that says what would be right.
     """
 
     def __init__(self, source: str | Path, where: str, problem: str, remedy: str) -> None:

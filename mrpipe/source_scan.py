@@ -20,7 +20,7 @@ def imported_modules(text: bytes, module: str, is_package: bool) -> Iterator[str
     text
         The source.
     module
-        Its dotted name; relative imports count from it.
+        Dotted name of the module; relative imports count from it.
     is_package
         It is the `__init__.py` of a package.
     """

@@ -17,6 +17,16 @@ hypothesis.settings.register_profile("explore", max_examples=1000, deadline=None
 hypothesis.settings.load_profile("suite")
 
 
+EVIDENCE = {"property", "golden", "literature", "oracle", "planted", "real"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Refuse tests without a marker that says what kind of evidence they give."""
+    bare = [item.nodeid for item in items if not EVIDENCE & {marker.name for marker in item.iter_markers()}]
+    if bare:
+        raise pytest.UsageError(f"mark with one of {', '.join(sorted(EVIDENCE))}: {', '.join(bare[:20])}")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def simple_figures() -> None:
     """Draw figures without keeping their texts apart, which takes half of the time: nobody looks at them here."""

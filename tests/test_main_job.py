@@ -17,6 +17,8 @@ import yaml
 from mrpipe.pipeline.fingerprint import digest_of_artifact
 from tests.small_project import MAIN_JOB
 
+pytestmark = pytest.mark.property
+
 SMALL = {
     "name": "small",
     **MAIN_JOB,

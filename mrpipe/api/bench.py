@@ -116,7 +116,7 @@ def prepare(campaign: Campaign | str | Path, **settings: Any) -> PreparedTests:
     campaign
         A campaign or its folder.
     settings
-        Of the section `prepare`.
+        Settings of the section `prepare`.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class DamperFit:
     damper
         The chosen model; `damper.force(...)` computes its force for a motion.
     chosen
-        Its fit and errors.
+        Fit and errors of the chosen form.
     comparison
         All forms that were tried.
     """
@@ -174,7 +174,7 @@ def fit_damper(tests: PreparedTests, **settings: Any) -> DamperFit:
     tests
         Prepared tests.
     settings
-        Of the section `identify_damper`, such as `form="dahl"`.
+        Settings of the section `identify_damper`, such as `form="dahl"`.
 
     Raises
     ------
@@ -196,7 +196,7 @@ class Traced:
     Attributes
     ----------
     summary
-        What `mrpipe close-loop --json` prints.
+        The summary that `mrpipe close-loop --json` prints.
     damper
         The damper with the named effects.
     tracing
@@ -250,11 +250,11 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
     tests
         Prepared tests with at least one validation test.
     seed
-        Of the resampling.
+        Seed of the resampling.
     jobs
         Processes.
     settings
-        Of the section `close_loop`.
+        Settings of the section `close_loop`.
     """
     from mrpipe.config.sections.close_loop import CloseLoopSettings
     from mrpipe.effects.library import damper_effects, effects_named, load_effect_file

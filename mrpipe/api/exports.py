@@ -30,7 +30,7 @@ def export(
     folder
         Folder of the files, made if missing.
     formats
-        Of `c`, `json`, `matlab` and, for networks, `onnx`; none: all that are possible.
+        Formats among `c`, `json`, `matlab` and, for networks, `onnx`; none: all that are possible.
     prefix
         First part of the names in C and MATLAB.
     floor

@@ -39,11 +39,11 @@ class Simulated:
     Attributes
     ----------
     law, gains
-        What controlled it.
+        Control law and its gains.
     indices
         RMS values, peaks, damping and more, as `mrpipe simulate --json` prints them.
     response
-        All histories.
+        Histories of the run.
     """
 
     law: str
@@ -97,9 +97,9 @@ class Designed:
     best
         Name of the law.
     gains
-        Its gains.
+        Gains of the law.
     summary
-        What `mrpipe design --json` prints.
+        The summary that `mrpipe design --json` prints.
     result
         Everything that was found.
     """
@@ -149,11 +149,11 @@ def simulate(
     law
         Control law, see docs/control-laws.md.
     gains
-        Its gains; None: those with the largest damping by the exact complex eigenvalue.
+        Gains of the law; None: those with the largest damping by the exact complex eigenvalue.
     base_amplitude_m_s2, frequency_rad_s
         Harmonic base acceleration [m/s^2], [rad/s]; the frequency is that of the first mode where it is None.
     excitation
-        In place of the harmonic one, from :mod:`mrpipe.simulation.excitation`.
+        Excitation that replaces the harmonic one, from :mod:`mrpipe.simulation.excitation`.
     floor
         Floor that the damper acts on, from 1.
     options
@@ -207,11 +207,11 @@ def design(
     floor
         Floor that the damper acts on, from 1.
     seed, jobs
-        Of the draws; processes.
+        Seed of the draws, and number of processes.
     laws
         Laws in the race.
     settings
-        Of the section `design`.
+        Settings of the section `design`.
     """
     from mrpipe.law_design.options import DesignSettings
     from mrpipe.law_design.results import design_as_json

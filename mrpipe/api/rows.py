@@ -23,7 +23,7 @@ def network_rows(
     kind
         `forward`: motion and drive to force; `inverse`: motion and force to drive.
     settings
-        Of the section `assemble`, such as `past_values=2`.
+        Settings of the section `assemble`, such as `past_values=2`.
 
     Returns
     -------

@@ -95,7 +95,7 @@ class Run:
 
     @property
     def verdict(self) -> dict[str, Any]:
-        """What close-loop found, as `mrpipe close-loop --json` prints it."""
+        """Verdict of close-loop, as `mrpipe close-loop --json` prints it."""
         path = self.directory / "close-loop.json"
         if not path.is_file():
             raise UserError(self.directory, path.name, "is not in this run", "run mrpipe close-loop first")

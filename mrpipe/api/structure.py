@@ -26,7 +26,7 @@ class IdentifiedFrame:
     frame
         Mass, damping and stiffness.
     summary
-        What `mrpipe identify-frame --json` prints.
+        The summary that `mrpipe identify-frame --json` prints.
     result
         Everything that was found.
     """
@@ -72,7 +72,7 @@ def identify_frame(campaign: Campaign | str | Path, **settings: Any) -> Identifi
     campaign
         A campaign of the rig `shear-frame`, or its folder.
     settings
-        Of the section `identify_frame`.
+        Settings of the section `identify_frame`.
 
     Raises
     ------

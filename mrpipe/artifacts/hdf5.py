@@ -30,7 +30,7 @@ SCHEMA = "mrpipe-artifact-1"
 
 @dataclass(frozen=True)
 class Provenance:
-    """How an artifact came about: written into the root of every file.
+    """Origin of an artifact, which is written into the root of every file.
 
     Attributes
     ----------

@@ -47,7 +47,7 @@ class ParameterSet:
     units
         Parameter -> unit as written in the file.
     notes
-        What the set does not claim.
+        Limits of the set, such as values that no source states.
     """
 
     name: str

@@ -111,7 +111,7 @@ class ChannelEntry(Entry):
 
 
 class TextEntry(Entry):
-    """How delimited text is laid out, where this cannot be found from the file."""
+    """Layout of delimited text, if it cannot be found from the file."""
 
     skip_lines: int = Field(default=0, ge=0)
     delimiter: str | None = None
@@ -120,7 +120,7 @@ class TextEntry(Entry):
 
 
 class FrameEntry(Entry):
-    """What is known of a frame; `sensor_positions_m` holds x and y of the sensors by the suffix of their channels."""
+    """Known properties of a frame; `sensor_positions_m` holds x and y of the sensors by the suffix of the channels."""
 
     floor_masses_kg: tuple[float | None, ...] = ()
     floor_inertias_kg_m2: tuple[float, ...] = ()

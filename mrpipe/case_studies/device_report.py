@@ -34,7 +34,7 @@ def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse
     device
         The damper.
     inverse
-        Its neural inverse; None if the formula is used.
+        Neural inverse of the device; None if the formula is used.
     """
     sink.figure(
         "force-diagram",

@@ -56,7 +56,7 @@ class IsolatedResponse:
     base_shear_n, storey_shear_n
         Shear between ground and base (bearings and devices), and above the base; shape (n, 2).
     base_displacement_m
-        At the points where it is judged (corners and centre), shape (n, points, 2).
+        Displacement of the points where it is judged (corners and centre), shape (n, points, 2).
     drift
         Storey drifts, shape (n, storeys, 2) [m].
     floor_acceleration_m_s2
@@ -134,7 +134,7 @@ class WindResponse:
     displacement_m, acceleration_m_s2
         Shape (n, 9).
     stroke_m, device_velocity_m_s, device_force_n
-        Of the device, shape (n,).
+        Stroke, velocity and force of the device, shape (n,).
     """
 
     displacement_m: FloatArray

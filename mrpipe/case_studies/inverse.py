@@ -103,11 +103,11 @@ def training_history(
     device
         The damper.
     rng
-        For frequencies, phases and noise.
+        Generator of the frequencies, phases and noise.
     fastest_m_s
         Highest velocity [m/s].
     records
-        Of each kind of motion.
+        Number of records of each kind of motion.
     """
     time: FloatArray = np.arange(round(_RECORD_S * RATE_HZ), dtype=np.float64) / RATE_HZ
     names, velocities, volts = [], [], []
@@ -133,7 +133,7 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
     device
         The damper.
     rng
-        For the records, starts and the split.
+        Generator of the records, the starts and the split.
     hidden
         Neurons of each hidden layer.
     jobs
@@ -150,6 +150,13 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
         iterations=40,
     )
     return train(training_history(device, rng), spec, options, rng, jobs=jobs)
+
+
+def neural_inverse(
+    device: BinghamDevice, rng: np.random.Generator, *, hidden: int = 6, jobs: int = 1
+) -> ValidatedInverse:
+    """Train the inverse network and validate it; see :func:`train_inverse` for the parameters."""
+    return validated_inverse(device, train_inverse(device, rng, hidden=hidden, jobs=jobs))
 
 
 def validated_inverse(device: BinghamDevice, trained: Trained) -> ValidatedInverse:

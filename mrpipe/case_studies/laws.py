@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 from mrpipe.case_studies.lqg import SampledController
-from mrpipe.case_studies.run import Controller
+from mrpipe.case_studies.run import BinghamDevice, Controller
 from mrpipe.errors import UserError
 
 LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
 """VD, VDNS, FDNS with MR dampers; LQG with ideal actuators, and clipped on the MR dampers; constant voltages."""
+
+
+PASSIVE = ("passive-off", "passive-on")
+"""Laws with a constant voltage."""
+
+
+def constant_voltage(law: str, device: BinghamDevice) -> float:
+    """Return the voltage [V] of a law of :data:`PASSIVE`."""
+    return 0.0 if law == "passive-off" else device.highest_voltage
 
 
 def unknown_law(law: str, structure: str) -> UserError:
@@ -26,24 +34,27 @@ def require_known(laws: Sequence[str], structure: str) -> None:
             raise unknown_law(law, structure)
 
 
-class LawGains(Protocol):
-    """Gains of the laws with MR dampers."""
+@dataclass(frozen=True)
+class LawGains:
+    """Gains of the laws with MR dampers, and the damping ratio for which they were calibrated.
 
-    @property
-    def viscous(self) -> float:
-        """Viscosity of vd [N s/m]."""
+    Attributes
+    ----------
+    viscous
+        Viscosity c of vd [N s/m].
+    negative_stiffness, negative_viscous
+        Stiffness k_d [N/m] and viscosity c [N s/m] of vdns.
+    friction
+        Gain alpha of fdns [N/m].
+    damping_ratio
+        Damping ratio of the calibrated mode under ideal vd [1].
+    """
 
-    @property
-    def negative_stiffness(self) -> float:
-        """Stiffness of vdns [N/m]."""
-
-    @property
-    def negative_viscous(self) -> float:
-        """Viscosity of vdns [N s/m]."""
-
-    @property
-    def friction(self) -> float:
-        """Gain of fdns [N/m]."""
+    viscous: float
+    negative_stiffness: float
+    negative_viscous: float
+    friction: float
+    damping_ratio: float
 
 
 def controller_of(
@@ -54,13 +65,13 @@ def controller_of(
     Parameters
     ----------
     law
-        Its name.
+        Name of the law.
     damper
         Controller with the MR damper and its inverse, whose law is replaced.
     gains, observer
-        Of the laws.
+        Gains of the laws, and the controller of LQG.
     structure
-        For messages, as in "the tower".
+        Name of the structure in messages, such as "the tower".
 
     Raises
     ------
@@ -77,7 +88,7 @@ def controller_of(
         return Controller("lqg", "active", observer=observer)
     if law == "lqg-clipped":
         return replace(damper, law="lqg", observer=observer)
-    if law in ("passive-off", "passive-on"):
-        volts = 0.0 if law == "passive-off" else damper.device.highest_voltage
+    if law in PASSIVE:
+        volts = constant_voltage(law, damper.device)
         return Controller("constant", "bingham", voltage=volts, device=damper.device, dampers=damper.dampers)
     raise unknown_law(law, structure)

@@ -44,7 +44,7 @@ class SampledController:
     measure, measure_force
         Shapes (p, nz), (p, k), of the plant's state.
     interval_s
-        Sample [s].
+        Sampling interval of the controller [s].
     """
 
     step: FloatArray
@@ -108,7 +108,7 @@ def sampled_controller(
     feedback, gain
         K and L.
     interval_s
-        Sample [s].
+        Sampling interval of the controller [s].
     """
     closed = A - gain @ measured.C
     inputs = np.hstack([B - gain @ measured.D, gain])
@@ -133,7 +133,7 @@ def sampled_loop_radius(A: FloatArray, B: FloatArray, controller: SampledControl
     A, B
         Plant, forces that push.
     controller
-        Its measurement contains the force of the previous sample, as in a run.
+        Controller whose measurement contains the force of the previous sample, as in a run.
     """
     n, k = B.shape
     m = controller.step.shape[0]

@@ -29,7 +29,7 @@ class BenchmarkModel:
     origin
         `published` (read from its file) or `surrogate` (assembled by our own code from published facts).
     source
-        Where the numbers come from, in a sentence.
+        A sentence that says where the numbers come from.
     frame
         Mass, damping and stiffness, and how the ground moves the structure, as every structure of the program.
     load
@@ -90,7 +90,7 @@ def published_frame(path: Path, name: str, mass: str, damping: str, stiffness: s
     path
         The file.
     name
-        Of the structure.
+        Name of the structure.
     mass, damping, stiffness
         Variables of the file, in t, kN s/m and kN/m.
 

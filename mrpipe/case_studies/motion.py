@@ -22,7 +22,7 @@ PUBLIC_MOTIONS = {
 BENCHMARK_INTERVAL_S = 0.005
 
 PERIODS_S = np.geomspace(0.05, 4.0, 60)
-"""Where the spectrum is matched [s]."""
+"""Periods at which the spectrum is matched [s]."""
 
 
 def design_spectrum(periods_s: FloatArray, peak_ground_g: float, soil: float = 1.15) -> FloatArray:
@@ -61,7 +61,7 @@ def response_spectrum(
     periods_s
         Shape (periods,) [s].
     damping_ratio
-        Of the oscillators.
+        Damping ratio of the oscillators.
     """
     from mrpipe.signals.discretisation import discretise_first_order
 
@@ -164,13 +164,13 @@ def load_motion(
     file, second_file
         Record, and that of the second component if it is a separate file.
     rng
-        For the synthetic motion.
+        Generator of the synthetic motion.
     unit, interval_s
-        What the file does not say; the seven benchmark motions are at 5 ms.
+        Unit and sampling interval [s], if the file does not state them; the seven benchmark motions are at 5 ms.
     resampled_interval_s
-        Interval wanted [s].
+        Interval to which the record is resampled [s]; None: its own.
     peak_ground_g, duration_s
-        Of the synthetic motion.
+        Design ground acceleration [g] and duration [s] of the synthetic motion.
 
     Raises
     ------

@@ -16,7 +16,7 @@ def named_file(option: str, value: str, public: Mapping[str, str]) -> Path:
     Parameters
     ----------
     option
-        Where the value was given, for the message.
+        Option that gave the value, for the message.
     value
         Name or path.
     public

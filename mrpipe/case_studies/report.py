@@ -44,7 +44,7 @@ def histories(
     quantity
         Label with unit.
     title
-        Of the figure.
+        Title of the figure.
     until_s
         Time shown; all if left out.
     reference_name
@@ -152,9 +152,9 @@ def sensitivity(
     indices
         Index -> values, shape (n,).
     unit
-        Of the capacity, for the label.
+        Unit of the capacity, for the label.
     title
-        Of the figure.
+        Title of the figure.
     """
     figure, axes = figure_with_axes(1, 1, width=7.0, height=3.4)
     axis = axes[0, 0]

@@ -43,7 +43,7 @@ class BinghamDevice:
     force, force_per_volt, viscosity, viscosity_per_volt
         N, N/V, N s/m, N s/m/V.
     highest_voltage
-        Saturation [V].
+        Voltage at which the damper saturates [V].
     """
 
     force: float = 100e3
@@ -62,7 +62,7 @@ def bingham_device(name: str) -> BinghamDevice:
 
 @dataclass(frozen=True)
 class Controller:
-    """What drives the devices.
+    """Control law that drives the devices, and how its force is realised.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Controller:
     observer
         The LQG controller, its sample a whole number of steps.
     noise
-        Of the measurements, shape (samples, outputs), used again from the start when it ends.
+        Noise of the measurements, shape (samples, outputs); it is repeated when it ends.
     """
 
     law: Law = "none"
@@ -129,7 +129,7 @@ class Response:
     loads
         w at these times, shape (N, m).
     forces, voltages, desired
-        Of the devices: mean force of the step before [N], voltage [V], desired force [N]; shape (N, k).
+        Histories of the devices: mean force of the step before [N], voltage [V], desired force [N]; shape (N, k).
     energies
         Input, structural damping, devices [J], shape (N, 3).
     """
@@ -313,9 +313,9 @@ def simulate(
     loads
         w, shape (N, m), at equal intervals; straight between samples.
     load_interval_s
-        Their interval [s].
+        Interval of the loads [s].
     controller
-        What drives the devices; none at all if left out.
+        Controller of the devices; None: there are no devices.
     ratio
         Steps for each load sample.
     save_every

@@ -24,7 +24,7 @@ RIGS = {"bench": "damper-bench", "frame": "shear-frame", "closed_loop": "shear-f
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What a check found.
+    """Findings of a check.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ def build_and_print(
     names
         Stages.
     options
-        Of the command.
+        Options of the command.
     together
         Kinds of stages, such as `simulate` and `resonance`, whose results for one law are printed as one document under
         the name of the first kind.

@@ -54,7 +54,7 @@ def explain(
     Parameters
     ----------
     error
-        What pydantic found.
+        The error that pydantic raised.
     model
         The model that was validated.
     source

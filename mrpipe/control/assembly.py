@@ -209,7 +209,7 @@ def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact
     Parameters
     ----------
     settings
-        Of the controller.
+        Settings of the controller.
     trained
         Function that opens the artifact of `train-inverse`. It is called only if a network is needed.
     """
@@ -229,7 +229,7 @@ def expected_amplitude(damper: DamperModel, tested: Mapping[str, float], modes: 
     tested
         Largest |displacement| of the bench tests [m] under the key `displacement`; empty if it is not known.
     modes
-        Of the target.
+        Modes of the target.
     """
     if tested.get("displacement", 0.0) > 0.0:
         return 0.5 * tested["displacement"]

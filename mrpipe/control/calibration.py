@@ -232,7 +232,7 @@ def validity_warnings(
     Parameters
     ----------
     calibration
-        Of all laws.
+        Calibration of all laws.
     amplitude_m
         Amplitude of the damper at which the forces are compared [m].
     residual_force_n, largest_force_n

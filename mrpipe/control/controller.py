@@ -191,7 +191,7 @@ def build_controller(
     law
         A law or its name.
     gains
-        Of the law.
+        Gains of the law.
     options
         Options of the controller.
     inverse

@@ -86,7 +86,7 @@ def exact_equivalent(frame: Frame, position: FloatArray, modes: LimitingModes, H
     frame, position, modes
         As in :func:`exact_damping`.
     H
-        Of the device [N/m].
+        Complex stiffness H of the device [N/m].
     """
     n = frame.floors
     inverse = np.linalg.inv(frame.mass)

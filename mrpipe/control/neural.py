@@ -15,6 +15,7 @@ from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec, Network, lagged
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
+from mrpipe.signals.error_size import nrmse
 from mrpipe.structures import Frame, natural_modes
 
 _SETTINGS = NeuralReferenceSettings()
@@ -32,7 +33,7 @@ class ReferenceOptions:
     amplitudes_m
         Amplitudes of the loops [m]; loops with amplitudes between them are used for verification.
     frequencies_hz
-        Of the loops.
+        Frequencies of the loops.
     rate_hz, past_values
         Sampling rate of the network [Hz], and number of past values of displacement and velocity in addition to the
         present ones.
@@ -88,7 +89,7 @@ class ReferenceNetwork:
         alpha_n_m
             Gain of FDNS that the network learned.
         amplitude_m, angular_frequency
-            Of the motion [m], [rad/s].
+            Amplitude and angular frequency of the motion [m], [rad/s].
         """
         H = equivalent_stiffness(lambda x, v: network_force(self.network, x, v), amplitude_m, angular_frequency)
         wanted = friction_stiffness(alpha_n_m)
@@ -128,7 +129,7 @@ def reference_options(
     Parameters
     ----------
     settings
-        Of the section `calibrate.neural`.
+        Settings of the section `calibrate.neural`.
     alpha_n_m
         Gain of FDNS.
     frame, modes
@@ -267,11 +268,11 @@ def _with_noise(history: History, options: ReferenceOptions, rng: np.random.Gene
 
 
 def _nrmse(network: Network, history: History) -> float:
-    errors, sizes = [], []
+    errors, targets = [], []
     past = network.features.past_values
     for index in range(len(history.names)):
         rows = lagged([history.record(index, "displacement"), history.record(index, "velocity")], past)
         target = history.record(index, "force")[past:]
         errors.append(network.predict(rows) - target)
-        sizes.append(target)
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2) / np.mean(np.concatenate(sizes) ** 2)))
+        targets.append(target)
+    return nrmse(np.concatenate(errors), np.concatenate(targets))

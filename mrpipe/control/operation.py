@@ -23,7 +23,7 @@ class PlacedOperation:
     Attributes
     ----------
     summary
-        What `mrpipe calibrate --json` prints for the damper.
+        The summary that `mrpipe calibrate --json` prints for the damper.
     weights
         Weights of the regulator of clipped LQG.
     warnings
@@ -45,7 +45,7 @@ def forces_at(damper: DamperModel, amplitude_m: float, modes: LimitingModes) -> 
     amplitude_m
         Amplitude of the damper [m].
     modes
-        Of the target; the damper moves at the frequency of the free mode.
+        Modes of the target; the damper moves at the frequency of the free mode.
     """
     speed = amplitude_m * modes.omega_0
     residual, largest = (float(damper.quasi_static_force(speed, drive)) for drive in (0.0, damper.drive_limit))

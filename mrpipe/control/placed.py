@@ -70,7 +70,7 @@ class PlacedCalibration:
     Attributes
     ----------
     damper
-        What was calibrated.
+        The damper that was calibrated.
     modes
         Limiting modes of its target mode with a rigid brace, without the other dampers.
     static_stiffness_n_m
@@ -112,7 +112,7 @@ def calibrate_placed(
     frame
         The structure.
     dampers
-        What is calibrated.
+        The dampers that are calibrated.
     options
         Source of the gains and further options; the target mode is that of each damper.
     together

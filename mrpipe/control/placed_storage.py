@@ -98,7 +98,7 @@ class KnownDamper:
     Attributes
     ----------
     name, law
-        Of the damper.
+        Name and law of the damper.
     brace_n_m
         Stiffness of its brace [N/m]; infinite: rigid.
     omega_inf
@@ -122,7 +122,7 @@ def damper_as_json(
     Parameters
     ----------
     item
-        What was calibrated.
+        The calibration of the damper.
     amplitude_m, residual_force_n, rounding_m_s
         Expected amplitude [m], force without drive at this amplitude [N], and speed over which friction changes its
         sign [m/s].

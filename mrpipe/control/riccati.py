@@ -19,7 +19,7 @@ def regulator_gain(
     Parameters
     ----------
     A, B
-        Of x' = A x + B u, shapes (n, n), (n, k).
+        Matrices of x' = A x + B u, shapes (n, n), (n, k).
     Q, R, S
         Shapes (n, n), (k, k), (n, k); without S there is no mixed term.
     """
@@ -47,7 +47,7 @@ def predictor_gain(A: FloatArray, C: FloatArray, W: FloatArray, V: FloatArray) -
     Parameters
     ----------
     A, C
-        Of a sampled system, shapes (n, n), (p, n).
+        Matrices of a sampled system, shapes (n, n), (p, n).
     W, V
         Covariances of the noise of the states (n, n) and of the measurements (p, p).
     """

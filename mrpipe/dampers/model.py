@@ -182,7 +182,7 @@ def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> 
     Parameters
     ----------
     name
-        Of the result, for messages.
+        Name of the result, for messages.
     drive_unit
         `A` or `V`.
     form

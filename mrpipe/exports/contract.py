@@ -29,7 +29,7 @@ class Channel:
     name, unit
         As in the header of vectors.csv.
     values
-        Shape (n,).
+        Values of the channel, shape (n,).
     """
 
     name: str
@@ -92,9 +92,9 @@ class Subject:
     model
         The model.
     vectors
-        Its test vectors.
+        Test vectors of the model.
     details
-        Where it comes from, for the JSON file; `left_out` are sentences on what the model does not contain.
+        Origin of the model, for the JSON file; `left_out` are sentences on what the model does not contain.
     about
         Sentences for README.md of the folder: what the model is, and where it comes from.
     """
@@ -128,7 +128,7 @@ class ExportFormat:
     name
         Name of the format: `c`, `json`, `onnx` or `matlab`.
     files
-        From a subject to the files of the folder.
+        Function that returns the files of the folder for a subject.
     usage
         Sentences for README.md of the folder: how the files are used. `{name}` and `{prefix}` are those of
         the subject, `{upper}` is the prefix in capitals.

@@ -18,7 +18,7 @@ def as_json(subject: Subject, model: Mapping[str, Any]) -> str:
     Parameters
     ----------
     subject
-        What is exported.
+        The model that is exported.
     model
         The model as plain values.
     """

@@ -27,7 +27,7 @@ def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> lis
     Parameters
     ----------
     summary
-        Of close-loop.
+        Summary of close-loop.
     where
         `structure` or `plant`: where the effects are corrected.
     remedy
@@ -71,7 +71,7 @@ def dampers_left_out(dampers: Sequence[DamperSettings]) -> list[str]:
     Parameters
     ----------
     dampers
-        Section `structure.dampers`.
+        Settings of the section `structure.dampers`.
     """
     if not dampers:
         return []

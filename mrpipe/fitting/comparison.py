@@ -50,12 +50,12 @@ _SETTINGS = DamperFitSettings()
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How forms are fitted.
+    """Options of the fits of base forms.
 
     Attributes
     ----------
     method
-        How a form is searched.
+        Method by which a form is searched.
     cycles, maximum_samples, raw_force
         See :func:`mrpipe.fitting.samples.bench_recordings`.
     offsets
@@ -203,7 +203,7 @@ def compare_forms(
     tests
         Prepared tests.
     options
-        How forms are fitted.
+        Options of the fits.
     folds
         Number of parts of the cross-validation of the fitted forms; 0 or 1: no cross-validation.
     keep

@@ -160,8 +160,8 @@ def linear_derivatives(found: Fit, columns: FloatArray) -> FloatArray:
     found
         The fit.
     columns
-        Its regressors, shape (c, n). The steps of a coupled form read the laws, so that these regressors are only a
-        part of the derivative.
+        Regressors of the fit, shape (c, n). The steps of a coupled form read the laws, so that these regressors are
+        only a part of the derivative.
     """
     problem = found.problem
     w = weighting(problem)

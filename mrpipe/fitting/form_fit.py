@@ -99,7 +99,7 @@ _SETTINGS = DamperFitSettings()
 
 @dataclass(frozen=True)
 class FitMethod:
-    """How a form is searched.
+    """Method and effort of the search of a form.
 
     Attributes
     ----------

@@ -173,7 +173,7 @@ def calibrate_strength(
     motions
         Motions of the tests over which the share is pooled.
     share
-        Wanted share; None: the `strength_share` of the effect.
+        Share of the force that the effect shall have; None: the `strength_share` of the effect.
     tolerance
         Relative tolerance of the share.
 

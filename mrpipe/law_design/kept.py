@@ -27,7 +27,7 @@ class LawUnderDesign:
     Attributes
     ----------
     law
-        Its name.
+        Name of the law.
     start
         Calibrated gains; the fixed ones keep their values.
     free

@@ -17,7 +17,7 @@ from mrpipe.simulation.steady_state import CurveOptions, Run, Steady
 from mrpipe.simulation.windows import QUANTITIES, values_between
 
 RunOf = Callable[[str, Gains], Run]
-"""From a law and its gains to the function that runs the loop under an excitation."""
+"""Function that returns, for a law and its gains, the function that runs the loop under an excitation."""
 
 UNACCEPTABLE = 1e6
 """Value of the objective where the response grows without bound, in multiples of the reference. It is finite, because
@@ -74,7 +74,7 @@ class Motion:
     Attributes
     ----------
     name
-        For tables.
+        Name of the motion, for tables.
     excitation
         Base acceleration over time.
     """
@@ -114,7 +114,7 @@ class Objective:
     reference
         Quantity -> largest value of the reference design, which makes quantities with different units comparable.
     limits
-        Of damper and structure.
+        Limits of damper and structure.
     """
 
     weights: Mapping[str, float]
@@ -141,7 +141,7 @@ class Evaluation:
     motions
         Motion -> RMS and largest values.
     value
-        Of the objective.
+        Value of the objective.
     """
 
     law: str
@@ -211,11 +211,11 @@ def evaluate(
     run_of
         Function that returns the loop of a law.
     law, gains
-        Of the design.
+        Law and gains of the design.
     load, objective
-        What it is exposed to, and how responses become one number.
+        Excitation, and the objective that makes one number of the responses.
     options
-        Of the response curves.
+        Options of the response curves.
     known
         Responses of this loop that were measured before; new responses are added.
     """

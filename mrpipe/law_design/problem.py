@@ -35,7 +35,7 @@ class LoopOf:
     rig
         Structure, damper, controllers and options. The controllers are those for the nominal damper.
     seed
-        Of the sensor noise, which is the same in all runs, so that gains are compared under the same conditions.
+        Seed of the sensor noise, which is the same in all runs, so that gains are compared under the same conditions.
     """
 
     rig: Rig
@@ -91,7 +91,7 @@ def laws_in_the_race(
     Parameters
     ----------
     settings
-        Of the design.
+        Settings of the design.
     plant
         Gives the bounds of the gains.
     calibrated

@@ -58,9 +58,9 @@ def design_as_json(result: Result, settings: DesignSettings) -> dict[str, Any]:
     Parameters
     ----------
     result
-        Of the design.
+        Result of the design.
     settings
-        Of the design.
+        Settings of the design.
     """
     ranking, limits, weights = result.ranking, Limits.of(settings), settings.weights
     laws = {}

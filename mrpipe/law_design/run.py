@@ -116,9 +116,9 @@ class Result:
     front
         Designs for which no other is better in both top displacement and top acceleration (Pareto front).
     ranking
-        Under uncertainty; None without draws.
+        Ranking of the designs under uncertainty; None without draws.
     confirmation
-        Of the best design of all, with fixed or free gains.
+        Confirmation of the best design of all, with fixed or free gains.
     left_out
         Law -> why it is not compared.
     load
@@ -222,13 +222,13 @@ def run_design(
     rig, plant
         The loop, and the plant that gives the bounds of the gains.
     settings, load
-        Of the design.
+        Settings and load of the design.
     uncertainty
-        Of structure and damper.
+        Uncertainty of structure and damper.
     absolute
         Whether accelerations are absolute.
     rng
-        For sensor noise and draws.
+        Generator of the sensor noise and of the draws.
     jobs
         Threads; the result does not depend on their number.
     progress
@@ -236,7 +236,7 @@ def run_design(
     kept
         Results of an interrupted run; None: none are kept.
     identified
-        Where `rig` has a traced damper: the same rig with the damper before the tracing, for the design without it.
+        If `rig` has a traced damper, the same rig with the damper before the tracing, for a design without the effects.
     """
     # the threads use all processors; a second level of threads inside the linear algebra would only slow them down
     with threadpool_limits(1):

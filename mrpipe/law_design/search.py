@@ -35,7 +35,7 @@ class FreeGain:
     Attributes
     ----------
     name
-        Of the gain, with its unit.
+        Name of the gain, with its unit.
     low, high
         Bounds of the same sign, neither of them 0.
     """
@@ -62,7 +62,7 @@ _SETTINGS = DesignSettings()
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How gains are searched.
+    """Options of the search of gains.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ def simplex_search(
     start, steps
         First corner of the simplex, and the step to each of the others, shape (r,), in logarithms.
     bounds
-        Of each logarithm.
+        Bounds of each logarithm.
     tolerance
         Accuracy of a logarithm at which the search ends.
     most

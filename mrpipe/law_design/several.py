@@ -37,7 +37,7 @@ FIRST_STEP = -0.5
 
 @dataclass(frozen=True)
 class DampersDesign:
-    """What a design of several dampers found.
+    """Result of a design of several dampers.
 
     Attributes
     ----------
@@ -62,11 +62,11 @@ def design_dampers(
     Parameters
     ----------
     rig, settings, load
-        What is designed, and for what.
+        Rig whose dampers are designed, settings of the design, and its load.
     absolute
         Whether accelerations are absolute.
     seed
-        Of the sensor noise, which is the same in all runs.
+        Seed of the sensor noise, which is the same in all runs.
 
     Raises
     ------

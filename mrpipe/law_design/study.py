@@ -76,11 +76,11 @@ def design_law(
     entry
         The law and its free gains.
     load, objective
-        Of the design.
+        Load and objective of the design.
     options
-        Of the search.
+        Options of the search.
     final
-        Of the accurate response curves.
+        Options of the accurate response curves.
     """
     archive = _Archive()
     coarse = replace(COARSE, absolute=final.absolute, refined=tuple(objective.weights) or COARSE.refined)
@@ -154,9 +154,9 @@ def design_all(
     entries
         Laws under design.
     load, objective
-        Of the design.
+        Load and objective of the design.
     options
-        Of the search, and of the accurate response curves.
+        Options of the search, and of the accurate response curves.
     kept
         Results of an interrupted run, which are not computed again.
     jobs

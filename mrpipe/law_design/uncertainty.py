@@ -19,9 +19,9 @@ class FrameUncertainty:
     Attributes
     ----------
     frequency_relative
-        Of each natural frequency over the frequency, shape (n,) [1].
+        Standard deviation of each natural frequency over the frequency, shape (n,) [1].
     damping_ratio
-        Of each damping ratio, shape (n,) [1].
+        Standard deviation of each damping ratio, shape (n,) [1].
     """
 
     frequency_relative: FloatArray
@@ -105,7 +105,7 @@ def draw(
     frame, damper
         As identified.
     frame_uncertainty, damper_uncertainty
-        What is uncertain.
+        Uncertainty of the frame and of the damper.
     rng
         Generator of the draw.
     """

@@ -28,7 +28,7 @@ from mrpipe.structures import Frame
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well the identified structure predicts its forced tests.
+    """Agreement between the identified structure and its forced tests.
 
     Attributes
     ----------

@@ -60,7 +60,7 @@ class FrameIdentification:
     findings
         Messages for the user, one line each.
     doubts
-        Those findings because of which the structure may be wrong.
+        Findings that make it doubtful whether the structure is right.
     numbers
         Mode number (from 1) of each mode.
     clocks

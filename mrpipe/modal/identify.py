@@ -168,11 +168,7 @@ def _completed(
 ) -> FrameIdentification:
     """Return the structure that follows from the modes, and its comparison with the tests."""
     chosen, clocks, fit = found.chosen, found.clocks, found.chosen.search.fit
-    findings = [*found.findings, *tests.notes, *_shape_findings(chosen.search, layout)]
-    findings += _check_coherence(fit, tests) if tests.forced else []
-    clipped = listed([test.name for test in chosen.tests if test.is_clipped])
-    if clipped:
-        findings.append(Doubt(f"test {clipped}: shapes and damping ratios may be wrong because sensors are clipped"))
+    findings = _findings_on_tests(tests, layout, found)
     progress(0.5, "decays")
     damping, damping_notes = _damping(tests, fit, options)
     progress(0.6, "matrices")
@@ -183,9 +179,7 @@ def _completed(
     if rigid is None:
         assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given, scale)
     else:
-        axis = next((place.direction for place in fit.inputs if place.direction), "x")
-        assembly = assemble_rigid(fit, rigid, zeta, tests.floor_masses, tests.inertias, axis)
-        notes = list(assembly.findings)
+        assembly, notes = _assemble_rigid(fit, rigid, zeta, tests)
     findings += notes
     order = order_findings(chosen, tests, layout, options)
     findings += order
@@ -230,6 +224,17 @@ def _completed(
         amplitude=compared.amplitude,
         amplitude_in_time=compared.amplitude_in_time,
     )
+
+
+def _findings_on_tests(tests: FrameTests, layout: Layout, found: ModesOfTests) -> list[str]:
+    """Return findings on the tests and on the shapes of the modes."""
+    search = found.chosen.search
+    findings = [*found.findings, *tests.notes, *_shape_findings(search, layout)]
+    findings += _check_coherence(search.fit, tests) if tests.forced else []
+    clipped = listed([test.name for test in found.chosen.tests if test.is_clipped])
+    if clipped:
+        findings.append(Doubt(f"test {clipped}: shapes and damping ratios may be wrong because sensors are clipped"))
+    return findings
 
 
 def _shape_findings(search: ModeSearch, layout: Layout) -> list[str]:
@@ -283,6 +288,14 @@ def _names(fit: MultiModeFit, layout: Layout) -> tuple[str, ...]:
     if layout.is_chain:
         return tuple(f"floor {floor}" for floor in range(1, layout.floors + 1))
     return tuple(f"floor {sensor.floor} {sensor.direction}".strip() for sensor in fit.sensors)
+
+
+def _assemble_rigid(
+    fit: MultiModeFit, rigid: RigidShapes, zeta: FloatArray, tests: FrameTests
+) -> tuple[Assembly, list[str]]:
+    axis = next((place.direction for place in fit.inputs if place.direction), "x")
+    assembly = assemble_rigid(fit, rigid, zeta, tests.floor_masses, tests.inertias, axis)
+    return assembly, list(assembly.findings)
 
 
 def _assemble(

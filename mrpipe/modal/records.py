@@ -72,7 +72,7 @@ class FrameTest:
     added_masses
         Floor (from 1) and known mass [kg] that was added to it in this test.
     note
-        What the user should know of the part that is used; empty for none.
+        A note for the user on the part that is used; empty for none.
     is_clipped
         Whether a sensor reached its limit.
     is_part
@@ -213,7 +213,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     Parameters
     ----------
     recording
-        With channels floor_acceleration_i or floor_displacement_i, and ground_acceleration or input_force.
+        Recording with channels floor_acceleration_i or floor_displacement_i, and ground_acceleration or input_force.
     source
         campaign.yaml, for messages.
     floors
@@ -321,7 +321,7 @@ class FrameTests:
     inertias
         Shape (n,) [kg m^2]: moment of inertia of each floor about the origin of the positions; empty where unknown.
     part_notes
-        What the user should know of tests that were divided at gaps of their clock, one line for each test.
+        Notes for the user on tests that were divided at gaps of their clock, one line for each test.
     """
 
     forced: tuple[FrameTest, ...]

@@ -45,7 +45,7 @@ class RecordSpectrum:
     excitations
         Shape (m, k), one column per input.
     inputs
-        Where each input acts; floor 0 is the ground.
+        Floor at which each input acts; floor 0 is the ground.
     responses
         Shape (m, s), one column per sensor.
     sensors

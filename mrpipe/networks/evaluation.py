@@ -10,6 +10,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.networks.assembly import History, Samples, samples
 from mrpipe.networks.network import Network
+from mrpipe.signals.reversals import last_reversal
 
 REGIMES = ("pre_yield", "reversal", "post_yield")
 """The regimes of :func:`regimes_of`, in the order of their numbers."""
@@ -67,11 +68,9 @@ def travel_since_reversal(displacement: FloatArray, velocity: FloatArray, starts
     """
     travel = np.empty(len(displacement))
     for first, last in pairwise(starts):
-        sign = velocity[first:last] > 0.0
-        turns = np.flatnonzero(sign[1:] != sign[:-1]) + 1
-        place = np.searchsorted(turns, np.arange(last - first), side="right")
-        origin = displacement[first:last][np.concatenate([[0], turns])[place]]
-        travel[first:last] = np.where(place > 0, np.abs(displacement[first:last] - origin), np.inf)
+        own = displacement[first:last]
+        turned = last_reversal(velocity[first:last] > 0.0)
+        travel[first:last] = np.where(turned > 0, np.abs(own - own[turned]), np.inf)
     return travel
 
 
@@ -235,7 +234,7 @@ class Judgement:
         Parameters
         ----------
         unit
-            Of the target.
+            Unit of the target.
         span
             Range of the target. Where it is given (drive of an inverse network) errors are also shown as a share of it,
             and relative errors are left out for groups whose target is constant within each test: the RMS of a drive

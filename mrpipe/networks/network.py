@@ -117,11 +117,11 @@ class Network:
     Attributes
     ----------
     weights, biases
-        Of each layer, shapes (out, in) and (out,); the last layer has one neuron.
+        Weights and biases of each layer, shapes (out, in) and (out,); the last layer has one neuron.
     input_scale, input_shift
         Shape (features,), in the units of the features.
     output_scale, output_shift
-        In the unit of the target.
+        Scale and shift of the output, in the unit of the target.
     features
         Definition of the features.
     feature_minimum, feature_maximum
@@ -226,7 +226,7 @@ def averaged(networks: Sequence[Network]) -> Network:
     Parameters
     ----------
     networks
-        Of the same features, scaling and number of layers.
+        Networks of the same features, scaling and number of layers.
     """
     # the configuration needs this module without scipy
     from scipy.linalg import block_diag

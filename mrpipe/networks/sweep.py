@@ -101,11 +101,11 @@ def sweep(
     candidates
         Candidates to compare.
     options
-        How.
+        Options of the sweep.
     seed
         Seed of the splits and the starts. The starts of a candidate depend on the candidate and the seed only.
     normalisation
-        Of inputs and target, see :mod:`mrpipe.networks.scaling`.
+        Normalisation of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Number of threads; the results do not depend on it.
     cache
@@ -124,7 +124,8 @@ def sweep(
     further = crossings[1] if crossings else 0
     kept = [_kept_file(cache, f"screen-{digest}", item) is not None for item in candidates]
     with threadpool_limits(1):
-        screening, refining = predicted_cost(data[0].fit, candidates, options, further, kept)
+        rng = np.random.default_rng([seed, 3])
+        screening, refining = predicted_cost(data[0].fit, candidates, options, rng, further, kept)
     predicted = (screening + refining) / max(1, jobs)
     more = f" and up to {further} combinations of the best" if further else ""
     cores = "1 free core" if jobs <= 1 else f"{jobs} free cores"
@@ -267,16 +268,17 @@ def predicted_cost(
     history: History,
     candidates: Sequence[Candidate],
     options: SweepOptions,
+    rng: np.random.Generator,
     further: int = 0,
     kept: Sequence[bool] = (),
 ) -> tuple[float, float]:
     """Return the predicted time of screening and refining on one core [s], including `further` unknown candidates.
 
-    Candidates in `kept` have been screened by an earlier run.
+    Candidates in `kept` have been screened by an earlier run. `rng` draws the samples on which iterations are timed.
 
     Combinations and refined candidates are mostly in the larger half of the networks.
     """
-    screen, refine = predicted_costs(history, candidates, options)
+    screen, refine = predicted_costs(history, candidates, options, rng)
     upper = slice(len(screen) // 2, None)
     typical, typical_refined = float(np.sort(screen)[upper].mean()), float(np.sort(refine)[upper].mean())
     count = min(options.refined, len(candidates)) + min(-(-options.refined // 3), further)
@@ -285,17 +287,16 @@ def predicted_cost(
 
 
 def predicted_costs(
-    history: History, candidates: Sequence[Candidate], options: SweepOptions
+    history: History, candidates: Sequence[Candidate], options: SweepOptions, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Return the predicted times of screening and of refining each candidate on one core [s], shapes (candidates,).
 
     A few iterations of three candidates (the smallest, a middle and the largest) are timed; the others are
-    interpolated by their number of parameters.
+    interpolated by their number of parameters. `rng` draws the samples on which the iterations are timed.
     """
     sizes = np.array([candidate.parameters for candidate in candidates])
     order = np.argsort(sizes, kind="stable")
     probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
-    rng = np.random.default_rng(0)
     times = np.array([_iteration_seconds(candidates[probe], history.samples, options, rng) for probe in probes])
     # early stopping saves 0 to 60 % of the iterations
     effort = options.starts * 0.7

@@ -157,13 +157,13 @@ def train(
     history
         Tests of role training; validation tests are not used.
     spec
-        What the features are.
+        Definition of the features.
     options
         Options of the training.
     rng
         Random generator of the split and the starts; the result does not depend on `jobs`.
     normalisation
-        Of inputs and target, see :mod:`mrpipe.networks.scaling`.
+        Normalisation of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Threads.
     progress

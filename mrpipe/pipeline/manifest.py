@@ -44,7 +44,7 @@ class Manifest:
     stage
         Name of the stage.
     key
-        What its result depends on.
+        Key of all that the result depends on.
     outputs
         File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
     summary

@@ -79,7 +79,7 @@ class StageBars:
     Parameters
     ----------
     quiet
-        Show nothing.
+        Whether nothing is shown.
     """
 
     def __init__(self, quiet: bool) -> None:

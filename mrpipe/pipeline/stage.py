@@ -39,7 +39,7 @@ class StageContext:
     rng
         Generator seeded from the run's seed and the stage's name.
     seed
-        Of the run.
+        Seed of the run.
     jobs
         Number of processes that may be used; it does not change results.
     progress

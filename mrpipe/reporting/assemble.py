@@ -14,7 +14,7 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """What `assemble` joined.
+    """Rows that `assemble` joined, for the report.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class TrainingSet:
 
 
 def describe(sink: Sink, result: TrainingSet) -> None:
-    """Write the section."""
+    """Write the section of `assemble` of the report."""
     training = result.training
     sink.text(
         f"{len(training.names)} training tests, one after the other, give {training.samples} samples at "

@@ -82,7 +82,7 @@ def residual_maps(
     residual
         Residual force [N], shape (n,).
     unit
-        Of the residual.
+        Unit of the residual.
     """
     columns = min(2, len(maps))
     rows = -(-len(maps) // columns)

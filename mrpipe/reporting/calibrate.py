@@ -30,9 +30,9 @@ def describe(
     Parameters
     ----------
     sink
-        Of the report.
+        Part of the report that is written.
     frame, calibration, summary
-        What was calibrated, and its summary as `--json` prints it.
+        The frame, its calibration, and the summary as `--json` prints it.
     amplitude_m
         Damper amplitude of the loops that are shown.
     map_points

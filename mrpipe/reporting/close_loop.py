@@ -29,14 +29,14 @@ from mrpipe.tracing.bench.verdict.summary import Tracing
 
 @dataclass(frozen=True)
 class Traced:
-    """What `close-loop` found on a bench campaign.
+    """Results of `close-loop` on a bench campaign, for the report.
 
     Attributes
     ----------
     tracing
         The tracing with its models and errors.
     summary
-        What the stage prints.
+        The summary that the stage prints.
     named_share, least_share
         Share of the residual above which an effect is named, and above which it is considered.
     """
@@ -48,7 +48,7 @@ class Traced:
 
 
 def describe(sink: Sink, result: Traced) -> None:
-    """Write the section."""
+    """Write the section of `close-loop` of the report."""
     traced, summary = result.tracing, result.summary
     sink.text(in_plain_words(summary))
     _identified(sink, summary)

@@ -14,7 +14,7 @@ from mrpipe.tracing.structure.verdict import StructureTracing
 
 @dataclass(frozen=True)
 class TracedStructure:
-    """What `close-loop` found on a structure.
+    """Results of `close-loop` on a structure, for the report.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class TracedStructure:
 
 
 def describe(sink: Sink, result: TracedStructure) -> None:
-    """Write the section."""
+    """Write the section of `close-loop` of the report."""
     traced, summary = result.tracing, result.tracing.summary
     sink.text(figures.in_plain_words(summary))
     if traced.maps:

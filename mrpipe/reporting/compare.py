@@ -51,7 +51,7 @@ class KeptStage:
 
 @dataclass(frozen=True)
 class KeptRun:
-    """What a run directory keeps, without its artifacts.
+    """Contents of a run directory without its artifacts.
 
     Attributes
     ----------

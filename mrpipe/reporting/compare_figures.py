@@ -36,7 +36,7 @@ class Overlay:
     name
         Name of its file.
     caption
-        What it shows.
+        Caption of the figure.
     figure
         The figure.
     """

@@ -23,7 +23,7 @@ def damping_over_gain(
     marks
         Name -> (gain, damping ratio) of points to be marked.
     axis_label
-        Of the gain, with unit.
+        Label of the axis of the gain, with its unit.
     """
     figure, axes = figure_with_axes()
     axis = axes[0, 0]

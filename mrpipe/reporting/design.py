@@ -20,9 +20,9 @@ def describe(sink: Sink, result: Result, summary: Mapping[str, Any]) -> None:
     Parameters
     ----------
     sink
-        Of the report.
+        Part of the report that is written.
     result, summary
-        What was found, and the same as JSON.
+        Result of the design, and the same as JSON.
     """
     sink.text(in_plain_words(summary))
     sink.table("laws", laws_table(summary), "Best gains of every law, the largest responses and the calibrated gains.")

@@ -91,7 +91,7 @@ def in_lines(summary: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     summary
-        Of a design for one damper.
+        Summary of a design for one damper.
     """
     head = ("law", "best gains", "x_top [mm]", "a_top [m/s2]", "calibrated gains", "x_top [mm]", "a_top [m/s2]")
     rows = [head, *(_row(name, item) for name, item in _ordered(summary))]

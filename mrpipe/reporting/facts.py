@@ -24,15 +24,15 @@ class ReportStage:
     items
         Texts, tables and figures that the stage left for its section.
     summary
-        What the stage printed.
+        The summary that the stage printed.
     warnings
-        What the stage warned of.
+        Warnings of the stage.
     skipped
         Why it was skipped; empty where it ran.
     seconds
         Wall time.
     failed
-        What went wrong in the stage or in a part of it; empty where nothing did.
+        Error of the stage or of a part of it; empty if there was none.
     """
 
     name: str
@@ -54,7 +54,7 @@ class RunFacts:
     directory
         Run directory.
     title, description
-        From the configuration.
+        Title and description in the configuration.
     stages
         Stages that belong to the run, in the order of the pipeline.
     settings

@@ -16,7 +16,7 @@ _LARGEST_TABLE = 12
 
 
 def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
-    """Write the section."""
+    """Write the section on a structure whose matrices are given."""
     sink.text(f"The structure has {frame.floors} degrees of freedom. It was given, not identified.")
     if summary["full_degrees_of_freedom"] != frame.floors:
         sink.text(

@@ -17,7 +17,7 @@ from mrpipe.signals.prepared import PreparedTest
 
 @dataclass(frozen=True)
 class IdentifiedDamper:
-    """What `identify-damper` found.
+    """Results of `identify-damper` for the report.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class IdentifiedDamper:
     chosen
         The one that later stages use.
     summary
-        What the stage prints.
+        The summary that the stage prints.
     """
 
     tests: Sequence[PreparedTest]
@@ -38,7 +38,7 @@ class IdentifiedDamper:
 
 
 def describe(sink: Sink, result: IdentifiedDamper) -> None:
-    """Write the section."""
+    """Write the section of `identify-damper` of the report."""
     tests, judged, chosen, summary = result.tests, result.judged, result.chosen, result.summary
     sink.text(
         f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}; {chosen.fit.form.source}): NRMSE "

@@ -16,14 +16,14 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class IdentifiedFrame:
-    """What `identify-frame` found.
+    """Results of `identify-frame` for the report.
 
     Attributes
     ----------
     identification
         The frame with its tests and checks.
     summary
-        What the stage prints.
+        The summary that the stage prints.
     segment_s
         Length of the segments of the averaged spectra [s].
     """
@@ -34,7 +34,7 @@ class IdentifiedFrame:
 
 
 def describe(sink: Sink, result: IdentifiedFrame) -> None:
-    """Write the section."""
+    """Write the section of `identify-frame` of the report."""
     found, values = result.identification, result.summary
     count, frequencies = len(found.numbers), values["frequencies_hz"]
     sink.text(

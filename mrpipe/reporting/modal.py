@@ -109,11 +109,11 @@ def mode_shapes(
     shapes
         A row for each degree of freedom.
     frequencies_hz
-        Of the modes.
+        Frequencies of the modes.
     heights_m
         Height of each floor; None: unknown.
     names
-        Of the degrees of freedom; empty: floors in one direction.
+        Names of the degrees of freedom; empty: floors in one direction.
     """
     rows, modes = shapes.shape
     names = list(names) or floor_names(rows)

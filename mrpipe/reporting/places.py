@@ -31,7 +31,7 @@ def by_direction(names: Sequence[str]) -> dict[str, dict[int, int]] | None:
     Parameters
     ----------
     names
-        Of the degrees of freedom: `floor 3`, or with several directions `floor 3 x` and `floor 3 rotation`.
+        Names of the degrees of freedom: `floor 3`, or with several directions `floor 3 x` and `floor 3 rotation`.
     """
     found: dict[str, dict[int, int]] = {}
     for row, name in enumerate(names):

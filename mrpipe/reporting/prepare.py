@@ -19,14 +19,14 @@ _SHOWN_TESTS = 3
 
 @dataclass(frozen=True)
 class PreparedCampaign:
-    """What `prepare` made of a campaign.
+    """Tests of a campaign after `prepare`, for the report.
 
     Attributes
     ----------
     campaign
         The measured campaign.
     preparations
-        Its tests, prepared.
+        The prepared tests.
     rows
         Row of each test (:func:`mrpipe.signals.summary.preparation_row`).
     """
@@ -37,7 +37,7 @@ class PreparedCampaign:
 
 
 def describe(sink: Sink, result: PreparedCampaign) -> None:
-    """Write the section."""
+    """Write the section of `prepare` of the report."""
     campaign, preparations = result.campaign, result.preparations
     rows = [dict(row) for row in result.rows]
     random = sum(row["excitation"] == "random" for row in rows)

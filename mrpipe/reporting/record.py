@@ -23,7 +23,7 @@ class RecordedCampaign:
     declared
         Effects that the campaign declares.
     sampling_rate_hz
-        Of the recordings.
+        Sampling rate of the recordings.
     """
 
     campaign: str
@@ -33,7 +33,7 @@ class RecordedCampaign:
 
 
 def describe(sink: Sink, result: RecordedCampaign) -> None:
-    """Write the section."""
+    """Write the section of `record` of the report."""
     rate = result.sampling_rate_hz
     seconds = sum(samples for _, _, samples in result.tests) / rate
     sink.text(

@@ -19,9 +19,9 @@ def describe(sink: Sink, law: str, curves: Curves) -> None:
     Parameters
     ----------
     sink
-        Of the report.
+        Part of the report that is written.
     law, curves
-        What was measured.
+        The law, and its response curves.
     """
     nominal = curves.nominal
     sink.text(

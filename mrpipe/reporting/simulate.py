@@ -31,9 +31,9 @@ def describe(
     Parameters
     ----------
     sink
-        Of the report.
+        Part of the report that is written.
     law, rig, response, excitation
-        What ran.
+        The law, the rig, its response, and the excitation.
     values, viscous
         Indices of the run, and of vd under the same excitation where it was run.
     """

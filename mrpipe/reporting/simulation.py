@@ -23,7 +23,7 @@ def loops(displacement: FloatArray, velocity: FloatArray, force: FloatArray, des
     Parameters
     ----------
     displacement, velocity, force, desired
-        Of the damper, shape (m,) each [m], [m/s], [N], [N].
+        Histories of the damper, shape (m,) each [m], [m/s], [N], [N].
     title
         Name of the law.
     """

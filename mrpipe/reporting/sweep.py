@@ -17,7 +17,7 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What `sweep` found.
+    """Results of `sweep` for the report.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class SweepResult:
 
 
 def describe(sink: Sink, result: SweepResult) -> None:
-    """Write the section."""
+    """Write the section of `sweep` of the report."""
     outcomes, chosen = result.run.outcomes, result.chosen
     sink.text(
         f"{len(outcomes)} architectures, each from {len(chosen.screened)} random starts, were screened on few rows; "

@@ -14,7 +14,7 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class TrainedForward:
-    """What `train-forward` found.
+    """Results of `train-forward` for the report.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class TrainedForward:
 
 
 def describe(sink: Sink, result: TrainedForward) -> None:
-    """Write the section."""
+    """Write the section of `train-forward` of the report."""
     if result.free is not None:
         sink.text(
             f"NRMSE {result.judged.pooled.nrmse:.4f} one step ahead, {result.free.nrmse:.4f} when the network runs on "

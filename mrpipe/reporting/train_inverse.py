@@ -15,7 +15,7 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class TrainedInverse:
-    """What `train-inverse` found.
+    """Results of `train-inverse` for the report.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class TrainedInverse:
 
 
 def describe(sink: Sink, result: TrainedInverse) -> None:
-    """Write the section."""
+    """Write the section of `train-inverse` of the report."""
     unit = result.validation.drive_unit
     training.describe(sink, result.trained, result.judged, unit, result.drive_range)
     sink.figure(

@@ -17,11 +17,11 @@ def describe(sink: Sink, trained: Trained, judged: Judgement, unit: str, span: f
     Parameters
     ----------
     sink
-        Where it is written.
+        Part of the report that is written.
     trained, judged
         The training, and the network's errors on the validation tests.
     unit, span
-        Of the target, see :meth:`mrpipe.networks.evaluation.Judgement.rows`.
+        Unit and range of the target, see :meth:`mrpipe.networks.evaluation.Judgement.rows`.
     """
     network, pooled = trained.network, judged.pooled
     spread = [start.held_out_nrmse for start in trained.starts]

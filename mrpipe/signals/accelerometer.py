@@ -119,7 +119,7 @@ def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampli
     displacement, acceleration
         Shape (n,).
     sampling_rate_hz
-        Rate.
+        Sampling rate [Hz].
 
     Returns
     -------

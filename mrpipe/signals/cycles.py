@@ -31,7 +31,7 @@ class SteadyCycles:
         Index of the first sample at or above the mean level in each steady cycle, and of the end of the last one,
         shape (cycles + 1,); empty where the motion is not periodic.
     frequency_hz
-        Of the steady cycles, 0 if there are none.
+        Frequency of the steady cycles; 0 if there are none.
     amplitude
         Half of peak to peak, in the unit of the displacement.
     """

@@ -52,7 +52,7 @@ def savitzky_golay(
     window_s
         Length of the window [s]; widened to degree + 2 samples where shorter, and cut to the record.
     degree
-        Of the polynomial.
+        Degree of the polynomial.
     derivative
         1 for velocity, 2 for acceleration.
     """

@@ -40,7 +40,7 @@ def butterworth_lowpass(
     cutoff_hz
         Frequency of half power (-3 dB), for either phase; see :func:`usable_cutoff`.
     sampling_rate_hz
-        Of the values.
+        Sampling rate of the values [Hz].
     order
         Order of the filter.
     phase

@@ -191,7 +191,7 @@ def sensor_agreement(pairs: Sequence[tuple[FloatArray, FloatArray]], sampling_ra
     pairs
         Displacement [m] and acceleration [m/s2] of each test, shape (n,) each; their signs agree.
     sampling_rate_hz
-        Rate.
+        Sampling rate [Hz].
 
     Raises
     ------
@@ -256,7 +256,7 @@ def fused_displacement(
     displacement, acceleration
         Measured x [m] and a [m/s2] on one clock and with the same sensitivity, shape (n,).
     sampling_rate_hz
-        Rate.
+        Sampling rate [Hz].
     crossover_hz
         Frequency above which the acceleration has the larger weight.
     """

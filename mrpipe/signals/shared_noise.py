@@ -127,7 +127,7 @@ def quiet_motion(tests: Sequence[PreparedTest], noise: NoiseDensity) -> list[Pre
     tests
         Prepared tests.
     noise
-        Of :func:`shared_noise`.
+        Noise from :func:`shared_noise`.
     """
     return [_quiet(test, noise) for test in tests]
 

@@ -55,7 +55,7 @@ def cutoff_by_criterion(
     values
         Shape (n,).
     sampling_rate_hz
-        Rate.
+        Sampling rate [Hz].
     velocity_share
         If given, the cut-off is not higher than the frequency that holds this share of the power of the channel's
         time derivative. Under random motion the noise of a displacement sensor falls with frequency, and a cut-off at
@@ -104,7 +104,7 @@ def signal_end(values: FloatArray, sampling_rate_hz: float) -> float:
     values
         Shape (n,).
     sampling_rate_hz
-        Rate.
+        Sampling rate [Hz].
     """
     length = min(values.size, max(256, values.size // 2))
     frequencies, density = signal.welch(

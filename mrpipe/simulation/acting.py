@@ -166,7 +166,7 @@ def excitation_at(
     Parameters
     ----------
     settings
-        What shakes the base.
+        Settings of the excitation.
     free_rad_s
         Free frequency of the target mode.
     amplitude_m_s2

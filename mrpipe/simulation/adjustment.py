@@ -45,7 +45,7 @@ def adjusted_amplitude(
     excite
         Function from an amplitude to the excitation.
     rms_top_m
-        Wanted.
+        RMS displacement of the top floor that shall be reached [m].
     rounds
         Largest number of simulations.
     must

@@ -21,7 +21,7 @@ class Place:
     Attributes
     ----------
     name
-        For tables, such as `ground y`.
+        Name of the place in tables, such as `ground y`.
     shape
         Shape (n,): displacement of each degree of freedom per metre of the ground, or share of the force at each.
     force
@@ -87,9 +87,10 @@ def harmonic(
     Parameters
     ----------
     amplitude_m_s2, omega
-        Of the base acceleration [m/s^2], [rad/s].
+        Amplitude and angular frequency of the base acceleration [m/s^2], [rad/s].
     cycles, settling_cycles
-        Of the excitation; the indices are taken over the cycles after the settling ones.
+        Number of all cycles, and of the first ones, during which the structure settles; the indices are taken over
+        the others.
     ramp_cycles
         Length of the raised-cosine start.
     decay_s

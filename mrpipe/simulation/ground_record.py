@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.row import fields_of
 from mrpipe.campaigns.readers.strong_motion import (
     ENDINGS,
     common_window,
@@ -26,8 +26,6 @@ UNIFORM_SHARE = 0.9
 
 LONGEST_GAP = 10.0
 """Longest step of the clock of a recorder over its usual one; a longer one is a gap in the record."""
-
-_DECIMAL_COMMA = re.compile(r"^[+-]?\d+,\d+([eE][+-]?\d+)?$")
 
 
 def read_histories(
@@ -48,7 +46,7 @@ def read_histories(
         PEER AT2, COSMOS or CSMIP V2, or a zip of them; else text or CSV: time [s] and one or more columns, numbers
         divided by blanks, commas or semicolons; lines that do not begin with a number are headers.
     unit
-        Of the columns of a text file.
+        Unit of the columns of a text file.
     channels
         Names or numbers (from 1) of the histories; empty: all columns of a text file, and the horizontal channels of
         a record with at most two.
@@ -116,7 +114,7 @@ def _table(path: Path) -> tuple[FloatArray, list[str]]:
     headers: list[str] = []
     lines: list[int] = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-        words = _words(line)
+        words = fields_of(line)
         if not words or not (words[0][0].isdigit() or words[0][0] in "+-."):
             headers.append(line)
             continue
@@ -139,13 +137,6 @@ def _table(path: Path) -> tuple[FloatArray, list[str]]:
         raise UserError(path, f"line {lines[bad[0]]}", "holds a number that is not finite", "give finite numbers")
     _require_clock(path, table[:, 0], lines)
     return table, headers
-
-
-def _words(line: str) -> list[str]:
-    """Return the fields of a row; a comma is a decimal one between semicolons, or where each field holds one."""
-    fields = line.replace(";", " ").split()
-    decimal = ";" in line or (len(fields) > 1 and all(_DECIMAL_COMMA.match(field) for field in fields))
-    return [field.replace(",", ".") for field in fields] if decimal else line.replace(",", " ").split()
 
 
 def _require_clock(path: Path, time_s: FloatArray, lines: Sequence[int]) -> None:

@@ -64,7 +64,7 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     Parameters
     ----------
     response
-        Of a run with a decay.
+        Response of a run with a decay.
     start_s
         When the base stops.
     drive_threshold
@@ -117,11 +117,11 @@ def energy_damping(response: Response, start_s: float, omega: float) -> float:
     Parameters
     ----------
     response
-        Of a run with a decay.
+        Response of a run with a decay.
     start_s
         When the base stops.
     omega
-        Of the mode [rad/s].
+        Angular frequency of the mode [rad/s].
     """
     half = math.pi / omega
     at = np.interp(start_s + half * np.arange(3), response.time_s, response.energy)
@@ -177,11 +177,11 @@ def indices(
     Parameters
     ----------
     response, excitation
-        Of the run.
+        Response and excitation of the run.
     residual_force_n
         Force of the damper model at zero drive [N], used if the drive is never zero in the run.
     drive_limit
-        Of the damper.
+        Largest drive of the damper.
     """
     first, last = excitation.steady_s
     steady = (response.time_s >= first) & (response.time_s < last) if last > first else response.time_s >= 0.0
@@ -268,9 +268,9 @@ def places_table(response: Response, names: Sequence[str], excitation: Excitatio
     Parameters
     ----------
     response, excitation
-        Of the run; RMS values are taken where the response is steady.
+        Response and excitation of the run; RMS values are taken where the response is steady.
     names
-        Of the degrees of freedom.
+        Names of the degrees of freedom.
     """
     first, last = excitation.steady_s
     steady = (response.time_s >= first) & (response.time_s <= last)

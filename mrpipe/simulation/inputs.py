@@ -77,7 +77,7 @@ def acting_as_forces(excitation: Excitation, frame: Frame, shares: Mapping[str |
     Parameters
     ----------
     excitation
-        With one history, which acts everywhere with its share, or with one history for each degree of freedom.
+        Excitation with one history, which acts everywhere with its share, or with one for each degree of freedom.
     frame, shares
         Structure, and degree of freedom -> factor on its history.
     where
@@ -130,7 +130,7 @@ def ground_amplitude(details: Mapping[str, Any], purpose: str) -> float:
     Parameters
     ----------
     details
-        Of the excitation.
+        Details of the excitation.
     purpose
         Purpose of the amplitude, for the message.
 

@@ -55,11 +55,11 @@ class LoopOptions:
     driver_time_constant_s
         Lag of the current driver in addition to that of the damper's model; 0: none.
     noise
-        Of the sensors.
+        Noise of the sensors.
     record_rate_hz
         Rate of the histories in the response.
     fault
-        Of the sensors; None: none.
+        Fault of the sensors; None: there is none.
     """
 
     plant_rate_hz: float = _SETTINGS.plant_rate_hz
@@ -80,21 +80,21 @@ class Response:
     time_s
         Clock of the histories.
     displacement, velocity, acceleration
-        Of the floors relative to the ground, shape (m, n).
+        Histories of the floors relative to the ground, shape (m, n).
     absolute_acceleration
-        Of the floors, shape (m, n).
+        Absolute acceleration of the floors, shape (m, n).
     damper_displacement, damper_velocity
         Across the damper.
     force, drive, desired_force
         Damper force [N], drive at the damper [A or V], force desired by the controller [N].
     ground_acceleration
-        Of the base.
+        Acceleration of the base.
     base_shear
         r' M times the absolute accelerations, shape (m,): the force of structure and dampers on the ground [N].
     work_in, work_damper, work_frame, energy
         Work of the base, dissipated by damper and frame, and energy stored in the frame [J] since the start.
     commands
-        Of the controller, shape (samples, COMMAND_SIZE); see :mod:`mrpipe.control.kernel`.
+        Commands of the controller, shape (samples, COMMAND_SIZE); see :mod:`mrpipe.control.kernel`.
     command_time_s
         Clock of the controller.
     seconds
@@ -155,7 +155,7 @@ def base_shear(frame: Frame, absolute_acceleration: FloatArray) -> FloatArray:
     frame
         Gives the masses.
     absolute_acceleration
-        Of the degrees of freedom [m/s^2], shape (m, n).
+        Absolute acceleration of the degrees of freedom [m/s^2], shape (m, n).
     """
     # BLAS is not used, because its second thread continues to run after a product of this length
     return np.asarray(np.einsum("tf,f->t", absolute_acceleration, frame.ground_masses))
@@ -197,7 +197,7 @@ def simulate_law(
     chain
         Damper, with its effects; None with `tracking="ideal"`.
     controller
-        From :func:`~mrpipe.control.controller.build_controller`.
+        Controller that was made by :func:`~mrpipe.control.controller.build_controller`.
     excitation
         Base acceleration; its duration is that of the run.
     options
@@ -205,7 +205,7 @@ def simulate_law(
     position
         Connectivity vector w, shape (n,); floor 1 to ground if left out.
     rng
-        For sensor noise; needed where there is some.
+        Generator of the sensor noise; needed where there is some.
     initial_state
         [x, v] of the floors at the start, shape (2n,); rest if left out.
 

@@ -129,7 +129,7 @@ def measure_resonance(
     absolute
         Whether accelerations are absolute.
     rng
-        For sensor noise.
+        Generator of the sensor noise.
     progress
         Receives the share that is done.
     jobs

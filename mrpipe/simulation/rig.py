@@ -44,11 +44,11 @@ class Rig:
     Attributes
     ----------
     frame, damper
-        What is simulated.
+        Structure and damper that are simulated.
     controllers
         Builds the controller of any law for it.
     options
-        How the loop is run.
+        Options of the loop.
     """
 
     frame: Frame
@@ -124,7 +124,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
     Parameters
     ----------
     settings
-        Of the simulation: which frame, damper and controller.
+        Settings of the simulation: which frame, damper and controller.
     artifact
         Opens the artifact of a stage by its name: `identify-frame`, `identify-damper`, `calibrate`, `train-inverse`,
         `close-loop` for the traced damper, and `design` for its gains.

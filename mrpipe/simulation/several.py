@@ -48,13 +48,13 @@ class LoopDamper:
     Attributes
     ----------
     name
-        For messages and tables.
+        Name of the damper in messages and tables.
     position
         Connectivity vector w of damper and brace together, shape (n,).
     chain
         The damper with its effects; None with perfect tracking.
     controller
-        Of this damper.
+        Controller of this damper.
     brace_n_m
         Stiffness of the brace in series with the damper [N/m]; infinite: rigid.
     central
@@ -71,7 +71,7 @@ class LoopDamper:
 
 @dataclass(frozen=True)
 class DampersResponse:
-    """Response of the loop.
+    """Response of a loop with several dampers.
 
     Attributes
     ----------
@@ -118,15 +118,15 @@ def simulate_dampers(
     frame
         Structure.
     dampers
-        At least one; their controllers have the same rate.
+        One or more dampers; their controllers have the same rate.
     excitation
-        What acts on the structure; its duration is that of the run.
+        Excitation of the structure; its duration is that of the run.
     options
-        How the loop is run.
+        Options of the loop.
     regulator
-        Of the dampers with `central`.
+        Regulator of the dampers with `central`.
     rng
-        For sensor noise; needed where there is some.
+        Generator of the sensor noise; needed where there is some.
     initial_state
         [x, v] of the floors at the start, shape (2n,); rest if left out.
 

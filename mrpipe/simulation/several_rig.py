@@ -79,9 +79,9 @@ class DampersRig:
     frame
         The structure.
     dampers
-        In the order of the settings.
+        Dampers in the order of the settings.
     options
-        How the loop is run.
+        Options of the loop.
     accelerometers
         Degrees of freedom (from 0) that the observer of the central regulator reads.
     """

@@ -43,7 +43,7 @@ def response_summary(rig: DampersRig, response: DampersResponse, excitation: Exc
     Parameters
     ----------
     rig, response, excitation
-        What ran.
+        Rig, response and excitation of the run.
     """
     rows: list[dict[str, Any]] = []
     run: dict[str, Any] = {}

@@ -96,7 +96,7 @@ class Steady:
     Attributes
     ----------
     values
-        In the order of QUANTITIES.
+        Values in the order of QUANTITIES.
     errors
         Standard errors of the values. For two windows that agree it is half of their difference.
     steady
@@ -131,7 +131,7 @@ def steady_values(
     run
         Runs the loop under an excitation, from rest.
     amplitude_m_s2, omega
-        Of the base acceleration [m/s^2], [rad/s].
+        Amplitude and angular frequency of the base acceleration [m/s^2], [rad/s].
     options
         Lengths and tolerance.
     first_cycles
@@ -189,7 +189,7 @@ class SteadyResponses:
     run
         Runs the loop under an excitation, from rest.
     amplitude_m_s2
-        Of the base acceleration [m/s^2].
+        Amplitude of the base acceleration [m/s^2].
     options
         Lengths and accuracy.
     known
@@ -235,7 +235,7 @@ class SteadyResponses:
         omega
             Frequency [rad/s].
         column
-            Of the quantity.
+            Column of the quantity.
         error
             Largest relative standard error.
         most_cycles

@@ -145,7 +145,7 @@ def check_ranges(rig: Rig, controller: Controller, response: Response, tested: M
     Parameters
     ----------
     rig, controller, response
-        What ran.
+        Rig, controller and response of the run.
     tested
         Largest |displacement| [m] and |velocity| [m/s] of the bench tests; empty where they are not known.
     """
@@ -171,9 +171,10 @@ def check_networks(
     Parameters
     ----------
     controller, response
-        Of the run.
+        Controller and response of the run.
     acceleration
-        Of the damper at the samples of the controller [m/s^2], shape (samples,), for networks that read it.
+        Acceleration of the damper at the samples of the controller [m/s^2], shape (samples,), for networks that
+        read it.
     drive_counts
         False for a perfect damper, which no inverse is needed for.
     """
@@ -197,7 +198,7 @@ def check_damper(response: Response, tested: Mapping[str, float]) -> RangeCheck:
     Parameters
     ----------
     response
-        Of the run.
+        Response of the run.
     tested
         Largest |displacement| [m] and |velocity| [m/s] of the tests from which the model was identified.
     """

@@ -43,7 +43,7 @@ def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> F
     Parameters
     ----------
     response
-        Of the loop.
+        Response of the loop.
     edges_s
         Rising times [s], shape (k + 1,).
     absolute
@@ -90,7 +90,7 @@ def settled(windows: FloatArray, tolerance: float) -> int:
     windows
         Values of each window, shape (k, q), k at least 2.
     tolerance
-        Relative.
+        Relative tolerance.
     """
     judged = windows[:, : len(DISPLAYED)]
     last = judged[-1]

@@ -12,11 +12,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated import report
     from mrpipe.case_studies.base_isolated import study as bench
     from mrpipe.case_studies.base_isolated.structure import building_of
-    from mrpipe.case_studies.inverse import train_inverse, validated_inverse
+    from mrpipe.case_studies.inverse import neural_inverse
     from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion, motion_facts, motion_from_settings
     from mrpipe.case_studies.run import bingham_device
-    from mrpipe.case_studies.storage import write_response
+    from mrpipe.case_studies.storage import write_cases
     from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.base_isolated
@@ -35,8 +35,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     inverse = None
     if settings.neural_inverse:
         context.progress(0.05, "neural inverse of the damper")
-        trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
-        inverse = validated_inverse(device, trained)
+        inverse = neural_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
     study = bench.isolation_study(
         building,
         device=device,
@@ -60,9 +59,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary = report.summary(result, printed)
     with context.write("benchmark-base-isolated.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "motions", "thesis", "sensitivity")})
-        for case in cases:
-            write_response(artifact, f"responses/{case.law}", case.response)
-        artifact.attributes("/", model=building.model.origin, source=building.model.source)
+        write_cases(artifact, building.model, cases)
     report.describe(context.report, result, printed)
     return {**summary, "motion_details": motion_facts(motion)}
 

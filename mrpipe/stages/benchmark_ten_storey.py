@@ -11,7 +11,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.motion import motion_facts, motion_from_settings
     from mrpipe.case_studies.run import bingham_device
-    from mrpipe.case_studies.storage import write_response
+    from mrpipe.case_studies.storage import write_cases
     from mrpipe.case_studies.ten_storey import report
     from mrpipe.case_studies.ten_storey import study as bench
     from mrpipe.case_studies.ten_storey.structure import ten_storey
@@ -45,10 +45,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary = report.summary(studies, sweep, printed)
     with context.write("benchmark-ten-storey.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "variants", "thesis")})
-        for case in cases:
-            if case.variant == "filtered":
-                write_response(artifact, f"responses/{case.law}", case.response)
-        artifact.attributes("/", model=study.model.origin, source=study.model.source)
+        write_cases(artifact, study.model, [case for case in cases if case.variant == "filtered"])
     report.describe(context.report, studies, sweep, printed)
     return {**summary, "motion_details": motion_facts(motion)}
 

@@ -31,10 +31,10 @@ def _load(context: StageContext, settings: Any) -> WindLoad:
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.case_studies.inverse import train_inverse, validated_inverse
+    from mrpipe.case_studies.inverse import neural_inverse
     from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.run import bingham_device
-    from mrpipe.case_studies.storage import write_response
+    from mrpipe.case_studies.storage import write_cases
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
     from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
@@ -56,8 +56,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     inverse = None
     if settings.neural_inverse:
         context.progress(0.05, "neural inverse of the damper")
-        trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
-        inverse = validated_inverse(device, trained)
+        inverse = neural_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
     study = bench.wind_study(
         reference,
         tower,
@@ -83,9 +82,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary = report.summary(result, printed)
     with context.write("benchmark-wind.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "thesis", "sensitivity")})
-        for case in cases:
-            write_response(artifact, f"responses/{case.law}", case.response)
-        artifact.attributes("/", model=tower.model.origin, source=tower.model.source)
+        write_cases(artifact, tower.model, cases)
     report.describe(context.report, result, printed)
     return summary
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from mrpipe.config.sections.calibrate import CalibrateSettings
     from mrpipe.control.calibration import Calibration, CalibrationOptions
     from mrpipe.control.lqg import Weights
+    from mrpipe.control.neural import ReferenceNetwork, ReferenceOptions
     from mrpipe.structures import Frame
 
 
@@ -19,10 +20,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
     from mrpipe.control.limits import limiting_modes, placement_warning
-    from mrpipe.control.neural import reference_options, train_reference
+    from mrpipe.control.neural import reference_options
     from mrpipe.control.operation import forces_at
     from mrpipe.control.storage import calibration_to_json, write_calibration
-    from mrpipe.dampers.model import read_tested
     from mrpipe.effects.damper import damper_named
     from mrpipe.modal.storage import doubts_of
     from mrpipe.reporting import calibrate as report
@@ -40,8 +40,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     modes = limiting_modes(frame, position, settings.target_mode)
     amplitude = settings.expected_amplitude_m
     if amplitude is None:
-        tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
-        amplitude = expected_amplitude(damper, tested, modes)
+        amplitude = expected_amplitude(damper, _tested(context), modes)
     residual, largest = forces_at(damper, amplitude, modes)
     weights = balanced_weights(modes, residual, **settings.regulator.known())
     calibration = calibrate(frame, position, _options(settings, weights))
@@ -57,19 +56,14 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     rounding = settings.friction_rounding_share * (amplitude * modes.omega_0)
     reference = None
     if _networks(calibration):
-        trained = reference_options(
-            settings.neural, calibration.laws["nnc"].gains.alpha_n_m, frame, modes, amplitude, rounding
-        )
-        reference = train_reference(
-            trained, context.rng, lambda f, text="": context.progress(0.3 + 0.6 * f, f"nnc {text}")
-        )
+        alpha = calibration.laws["nnc"].gains.alpha_n_m
+        trained = reference_options(settings.neural, alpha, frame, modes, amplitude, rounding)
+        reference = _reference(context, trained)
     with context.write("control.h5") as artifact:
         write_calibration(artifact, calibration, position, weights, reference, rounding, amplitude, residual)
     summary = calibration_to_json(calibration)
     if reference is not None:
-        summary["laws"]["nnc"] |= reference.assessment(
-            calibration.laws["nnc"].gains.alpha_n_m, amplitude, modes.omega_0
-        )
+        summary["laws"]["nnc"] |= reference.assessment(alpha, amplitude, modes.omega_0)
     summary |= {
         "expected_amplitude_m": amplitude,
         "residual_force_n": residual,
@@ -77,6 +71,20 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     }
     report.describe(context.report, frame, calibration, summary, amplitude, settings.map_points)
     return summary
+
+
+def _tested(context: StageContext) -> dict[str, float]:
+    """Return the ranges of the bench tests; empty if the damper was not identified on a bench."""
+    from mrpipe.dampers.model import read_tested
+
+    return read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
+
+
+def _reference(context: StageContext, options: ReferenceOptions) -> ReferenceNetwork:
+    """Train the network of the law nnc."""
+    from mrpipe.control.neural import train_reference
+
+    return train_reference(options, context.rng, lambda f, text="": context.progress(0.3 + 0.6 * f, f"nnc {text}"))
 
 
 def _check_floor(floor: int, frame: Frame) -> None:

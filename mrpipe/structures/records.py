@@ -17,6 +17,7 @@ from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.peer import peer_record
+from mrpipe.campaigns.readers.row import fields_of
 from mrpipe.campaigns.readers.strong_motion import (
     ENDINGS,
     common_window,
@@ -189,10 +190,8 @@ def _text(path: Path) -> str:
 
 
 def _numbers(line: str) -> list[float] | None:
-    # between semicolons a comma is a decimal one
-    fields = (line.replace(",", ".") if ";" in line else line.replace(",", " ")).replace(";", " ").split()
     try:
-        return [float(field) for field in fields]
+        return [float(field) for field in fields_of(line)]
     except ValueError:
         return None
 

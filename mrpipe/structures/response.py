@@ -21,7 +21,7 @@ class LinearResponse:
     displacement, velocity
         Displacement and velocity relative to the ground [m], [m/s].
     absolute_acceleration
-        [m/s2].
+        Absolute acceleration [m/s^2].
     """
 
     displacement: FloatArray

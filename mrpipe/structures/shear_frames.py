@@ -56,7 +56,7 @@ def frame_from_modes(
     floor_masses
         Shape (n,) [kg].
     name, source
-        For tables and for messages.
+        Name and source of the frame, for tables and messages.
 
     Raises
     ------

@@ -39,12 +39,12 @@ def reference_rms_top_m() -> float:
 
 @dataclass(frozen=True)
 class Bench:
-    """What the ledger computes with.
+    """Structure, damper, controllers and networks with which the ledger computes.
 
     Attributes
     ----------
     source
-        Where it comes from, in words.
+        Words that say where it comes from.
     rig
         Frame, damper, controllers and options of the loop.
     traced
@@ -53,7 +53,7 @@ class Bench:
     artifacts
         Stage -> its artifact; empty without a run.
     seed
-        Of the sensor noise.
+        Seed of the sensor noise.
     """
 
     source: str
@@ -88,11 +88,11 @@ def bench_of_run(settings: SimulateSettings, artifacts: Mapping[str, Artifact], 
     Parameters
     ----------
     settings
-        Of the simulation. The damper is the identified one and gives the force, whatever they say.
+        Settings of the simulation. The damper is always the identified one, and it gives the force.
     artifacts
         Stage -> artifact: identify-frame, identify-damper, calibrate, train-inverse and what else there is.
     seed
-        Of the run.
+        Seed of the run.
     """
     chosen = settings.changed(damper="identified", tracking="damper")
     artifact: Callable[[str], Artifact] = lambda stage: artifacts[stage]  # noqa: E731

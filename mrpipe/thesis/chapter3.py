@@ -114,7 +114,7 @@ def chapter_3(bench: Bench, frame: Frame) -> Outcomes:
     Parameters
     ----------
     bench
-        Of the run.
+        Structure, damper and controllers of the run.
     frame
         The printed frame with the signs of its mode matrix corrected.
     """

@@ -9,6 +9,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.signals.error_size import nrmse
 from mrpipe.signals.kalman import continuous_kalman_gains, kinematic_kalman
 from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.structures import Frame, floor_position
@@ -103,7 +104,7 @@ def _kalman() -> Outcomes:
     v: FloatArray = 6e-3 * OMEGA * np.cos(OMEGA * time)
     _, estimated, _ = kinematic_kalman(x, -(OMEGA**2) * x, 1.0 / _RATE_HZ, gains)
     late = time > 10.0
-    error = float(np.sqrt(np.mean((estimated - v)[late] ** 2) / np.mean(v[late] ** 2)))
+    error = nrmse((estimated - v)[late], v[late])
     return {
         "A12e": Value([abs(printed), -np.angle(printed)], "transfer function of (5.3) as printed"),
         "A12f": Value(error, "discrete Kalman filter on sinusoidal motion"),
@@ -117,7 +118,7 @@ def cycle_peaks(run: LoopRun) -> dict[str, float]:
     Parameters
     ----------
     run
-        Under harmonic excitation.
+        Run under harmonic excitation.
     """
     response, excitation = run.response, run.excitation
     first, last = excitation.steady_s
@@ -182,7 +183,7 @@ def chapter_4(bench: Bench, frame: Frame) -> Outcomes:
     Parameters
     ----------
     bench
-        What the closed loop is run with.
+        Structure, damper and controllers of the closed loop.
     frame
         The printed frame with the signs of its mode matrix corrected, for the closed forms.
     """

@@ -257,7 +257,7 @@ def chapter_5(bench: Bench, sets: Bench, progress: Progress) -> tuple[Outcomes, 
     Parameters
     ----------
     bench
-        Of the run.
+        Structure, damper and controllers of the run.
     sets
         The printed frame with damper set C, for the checks of the errata page.
     progress

@@ -14,7 +14,7 @@ from mrpipe.case_studies.base_isolated.study import isolated_response, isolation
 from mrpipe.case_studies.model import modal_model
 from mrpipe.case_studies.motion import load_motion
 from mrpipe.case_studies.options import LqgWeights, WindClimate
-from mrpipe.case_studies.run import BinghamDevice
+from mrpipe.case_studies.run import bingham_device
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.case_studies.ten_storey.study import TenStoreyCase, ten_storey_study
 from mrpipe.case_studies.wind.load import synthetic_wind
@@ -34,6 +34,7 @@ _RATED_N = 1.0e6
 _WIND_STEP_S = 0.002
 """Longest step of the tower [s]; `mrpipe benchmark wind` takes half of it and twice the time."""
 _LAWS = ("vd", "vdns", "fdns", "lqg")
+_DEVICE = "bingham-1000kn"
 NO_DATA = (
     "the public data are not here (MRPIPE_DATA): {what}; a surrogate and a synthetic motion would give other numbers"
 )
@@ -41,18 +42,21 @@ NO_DATA = (
 
 @dataclass(frozen=True)
 class CaseOptions:
-    """How the benchmark structures are run; the settings `benchmark` of the configuration.
+    """Options of the benchmark structures; the settings `benchmark` of the configuration.
 
     Attributes
     ----------
     isolation_damping_ratio, isolation_stiffness_share, isolation_lqg
-        Of the base-isolated building.
+        Settings of the base-isolated building.
     wind_stiffness_share, wind_lqg, wind_modes, tuned_mass_kg
-        Of the tower.
+        Settings of the tower.
     climate, wind_duration_s, wind_interval_s
-        Of the wind load.
+        Settings of the wind load.
     filter_rate
-        Of the voltage filter of P4 (24) [1/s].
+        Rate of the voltage filter of P4 (24) [1/s].
+    seed
+        Seed of the synthetic ground motion and wind load. It is not that of the run, so that the ledger is the same for
+        every run.
     """
 
     isolation_damping_ratio: float = 0.1
@@ -66,6 +70,7 @@ class CaseOptions:
     wind_duration_s: float = 900.0
     wind_interval_s: float = 0.05
     filter_rate: float = 31.4
+    seed: int = 0
 
 
 def _has(*parts: str) -> bool:
@@ -93,12 +98,6 @@ def _ten_storey_structure() -> Outcomes:
             f"on both sides it makes K indefinite (eigenvalue {smallest:.3g} rad^2/s^2)",
         ),
     }
-
-
-def _device() -> BinghamDevice:
-    values = load_parameter_set("dampers", "bingham-1000kn")
-    parts = ("yield_force_a", "yield_force_b", "c0_a", "c0_b", "drive_limit")
-    return BinghamDevice(*(values.scalar(part) for part in parts))
 
 
 def unit_of_command(coefficient: str, product: str) -> str:
@@ -138,10 +137,10 @@ def _ten_storey(options: CaseOptions) -> Outcomes:
     if not _has("ground_motions", "elcentro_NS.dat"):
         reason = Missing(NO_DATA.format(what="the El Centro record"))
         return dict.fromkeys([*names, "F6-p4-indices", "F6-p4-voltage"], reason)
-    motion = load_motion("elcentro-ns", np.random.default_rng(0), unit="g").in_components(1)
+    motion = load_motion("elcentro-ns", np.random.default_rng(options.seed), unit="g").in_components(1)
     chain = damper_from_parameter_set(load_parameter_set("dampers", "p4-1000kn")).chain()
     study = ten_storey_study(
-        ten_storey("ten-storey"), motion, device=_device(), chain=chain, filter_rate=options.filter_rate
+        ten_storey("ten-storey"), motion, device=bingham_device(_DEVICE), chain=chain, filter_rate=options.filter_rate
     )
     cases = {law: study.case(law) for law in printed}
     by = "ten-storey frame of 2 pi rad/s, modified Bouc-Wen damper, 1940 El Centro record"
@@ -195,11 +194,11 @@ def _isolated(options: CaseOptions) -> Outcomes:
         else surrogate_building()
     )
     motion: GroundMotion = load_motion(
-        "elcentro" if published else "synthetic", np.random.default_rng(0)
+        "elcentro" if published else "synthetic", np.random.default_rng(options.seed)
     ).in_components(2)
     study = isolation_study(
         building,
-        device=_device(),
+        device=bingham_device(_DEVICE),
         network=None,
         damping_ratio=options.isolation_damping_ratio,
         stiffness_share=options.isolation_stiffness_share,
@@ -238,7 +237,7 @@ def _wind(options: CaseOptions) -> Outcomes:
         missing = Missing(NO_DATA.format(what="the matrices of the tower"))
         found |= dict.fromkeys(("A19", "T6-frequencies", "A20b"), missing)
     load = synthetic_wind(
-        np.random.default_rng(0),
+        np.random.default_rng(options.seed),
         FLOORS,
         HEIGHT_M,
         WIDTH_M,
@@ -250,7 +249,7 @@ def _wind(options: CaseOptions) -> Outcomes:
         reference,
         reference,
         load,
-        device=_device(),
+        device=bingham_device(_DEVICE),
         network=None,
         stiffness_share=options.wind_stiffness_share,
         tuned_mass_kg=options.tuned_mass_kg,
@@ -272,9 +271,9 @@ def chapter_6(frame: Frame, options: CaseOptions, progress: Progress) -> Outcome
     Parameters
     ----------
     frame
-        For the regulator of appendix E.
+        Frame of the regulator of appendix E.
     options
-        How the benchmark structures are run.
+        Options of the benchmark structures.
     progress
         Receives the share that is done.
     """

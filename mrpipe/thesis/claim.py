@@ -23,9 +23,9 @@ class Value:
     value
         A number, a list of numbers, or words.
     by
-        How it was computed: from which part of the run or from which parameter sets.
+        A clause that says how it was computed: from which part of the run or from which parameter sets.
     why
-        What explains a deviation, where the computation knows more than the entry says.
+        Reason for a deviation, if the computation knows more than the entry says.
     """
 
     value: Any
@@ -51,7 +51,7 @@ class Claim:
     Attributes
     ----------
     entry
-        What is compared and how.
+        The number that is compared, and how.
     recomputed
         Number, list of numbers or words; None where there is none.
     verdict
@@ -59,7 +59,7 @@ class Claim:
     why
         Why it differs, or why it cannot be recomputed; empty where it holds.
     by
-        How it was recomputed.
+        A clause that says how it was recomputed.
     """
 
     entry: Entry
@@ -75,7 +75,7 @@ class Claim:
 
     @property
     def printed(self) -> Any:
-        """What is printed; for a statement the rule in words."""
+        """Printed value; for a statement the rule in words."""
         return rule_text(self.entry.rule) if self.entry.rule else _plain(self.entry.printed)
 
     def as_dict(self) -> dict[str, Any]:
@@ -144,9 +144,9 @@ def judge(entry: Entry, outcome: Outcome) -> Claim:
     Parameters
     ----------
     entry
-        What is printed, with tolerance or rule.
+        The printed number, with tolerance or rule.
     outcome
-        What was recomputed, or why nothing was.
+        The recomputed value, or why there is none.
     """
     if entry.given:
         why = "it sets the amplitude of the excitation, so that a recomputed value could not disagree"

@@ -29,9 +29,9 @@ class Ledger:
     Attributes
     ----------
     claims
-        In the order of the entries.
+        Claims in the order of the entries.
     cases
-        Of Table 5.1 by name; empty without chapter 5.
+        Cases of Table 5.1 by name; empty without chapter 5.
     """
 
     claims: tuple[Claim, ...]
@@ -63,13 +63,13 @@ def build_ledger(
     Parameters
     ----------
     bench
-        What is compared with the thesis: a run, or parameter sets.
+        A run, or parameter sets, that are compared with the thesis.
     printed_frame
         The printed frame with the signs of its mode matrix corrected: what the printed inputs give.
     options
-        How the benchmark structures are run.
+        Options of the benchmark structures.
     chapters
-        Of the thesis, 2 to 6.
+        Chapters of the thesis, 2 to 6.
     progress
         Receives the share that is done.
 

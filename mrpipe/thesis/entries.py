@@ -31,13 +31,13 @@ class Entry:
     id
         Unique. `A4b` is the second entry of row 4 of the errata page.
     chapter
-        Of the thesis; papers are listed with the chapter that uses them.
+        Chapter of the thesis; papers are listed with the chapter that uses them.
     kind
         See :data:`KINDS`.
     what
-        What is compared, with its unit.
+        The quantity that is compared, with its unit.
     place
-        Where it is printed.
+        Place where it is printed.
     printed
         Number, list of numbers or words; None where the entry is judged by a rule, or where nothing is printed.
     tolerance

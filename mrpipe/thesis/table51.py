@@ -73,11 +73,11 @@ class Reading:
     fit
         Exponential fit over the extrema with current (thesis 5.5.1); None where there is none.
     first_half_period
-        From the first extremum after the base stops to the next; None where there is none.
+        Damping ratio from the first extremum after the base stops to the next; None where there is none.
     energy
-        By the stored energy over the first period.
+        Damping ratio by the stored energy over the first period.
     extrema_m
-        Of the top displacement.
+        Extrema of the top displacement.
     """
 
     fit: float | None
@@ -115,7 +115,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Both in words."""
+        """Name of the case: damper and excitation in words."""
         return f"{self.damper}, {self.where}"
 
 
@@ -217,7 +217,8 @@ def explain(bench: Bench, progress: Progress) -> dict[str, Case]:
     Parameters
     ----------
     bench
-        Of a run, or of the parameter sets. Without a traced damper the cases with its effects are missing.
+        Structure, damper and controllers of a run, or of the parameter sets. Without a traced damper the cases with
+        its effects are missing.
     progress
         Receives the share that is done.
     """
@@ -271,9 +272,9 @@ def peak_over_frequency(bench: Bench, law: str, gain: str, values: tuple[float, 
     bench, law, gain
         Which loop, and which of its gains.
     values
-        Of the gain.
+        Values of the gain.
     amplitude
-        Of the base acceleration [m/s^2].
+        Amplitude of the base acceleration [m/s^2].
     """
     rig = bench.rig
     column = QUANTITIES.index("rms_x_top_m")

@@ -87,7 +87,7 @@ class Estimate:
     value, unit
         Value of the parameter, and its unit.
     interval
-        Its interval.
+        Interval of the value.
     by_storey
         Values of all storeys, lowest first, if it differs between them.
     """
@@ -220,7 +220,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What remains after the named effects.
+    """Part of the residual that remains after the named effects.
 
     Attributes
     ----------
@@ -333,7 +333,7 @@ class Verdict:
     share
         Share of the recoverable squared error that the named effects or the base form remove on validation tests.
     differences
-        How validation tests differ from training tests.
+        Differences between the validation tests and the training tests.
     comparable
         Errors on the comparable part, where validation tests differ.
     notes

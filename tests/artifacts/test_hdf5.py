@@ -22,6 +22,7 @@ def _write(path: Path) -> None:
         artifact.attributes("tests/one", role="training", sampling_rate_hz=200.0)
 
 
+@pytest.mark.property
 def test_every_dataset_has_unit_and_dims_for_h5py_alone(tmp_path: Path) -> None:
     _write(tmp_path / "a.h5")
     with h5py.File(tmp_path / "a.h5") as handle:
@@ -32,6 +33,7 @@ def test_every_dataset_has_unit_and_dims_for_h5py_alone(tmp_path: Path) -> None:
         assert list(handle["tests/one/force"].attrs["dims"]) == ["time"]
 
 
+@pytest.mark.property
 def test_reads_what_was_written(tmp_path: Path) -> None:
     _write(tmp_path / "a.h5")
     artifact = Artifact(tmp_path / "a.h5")
@@ -55,6 +57,7 @@ def test_any_array_comes_back_bit_for_bit(values: np.ndarray, tmp_path_factory: 
     assert Artifact(path).array("x").tobytes() == values.tobytes()
 
 
+@pytest.mark.property
 def test_dims_must_name_every_axis(tmp_path: Path) -> None:
     with (
         pytest.raises(ValueError, match="x: 2 axes"),
@@ -64,6 +67,7 @@ def test_dims_must_name_every_axis(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.property
 def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
     text = tmp_path / "text.h5"
     text.write_text("no HDF5")
@@ -75,12 +79,14 @@ def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
         Artifact(tmp_path / "foreign.h5")
 
 
+@pytest.mark.property
 def test_missing_dataset_is_named(tmp_path: Path) -> None:
     _write(tmp_path / "a.h5")
     with pytest.raises(UserError, match="none: no such dataset"):
         Artifact(tmp_path / "a.h5").array("none")
 
 
+@pytest.mark.property
 def test_old_text_stays_until_the_new_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "note.txt"
     atomic_write_text(path, "old")
@@ -89,6 +95,7 @@ def test_old_text_stays_until_the_new_is_whole(tmp_path: Path) -> None:
     assert [item.name for item in path.parent.iterdir()] == ["note.txt"]
 
 
+@pytest.mark.property
 def test_an_error_of_writing_names_the_file_and_no_temporary_one(tmp_path: Path) -> None:
     import errno
 

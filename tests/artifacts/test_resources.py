@@ -9,6 +9,8 @@ import pytest
 from mrpipe.artifacts import config_directory, load_parameter_set
 from mrpipe.errors import UserError
 
+pytestmark = pytest.mark.property
+
 SETS = sorted(
     (kind, path.stem)
     for kind in ("dampers", "frames", "structures")

@@ -11,6 +11,8 @@ import pytest
 
 from mrpipe.cli import run
 
+pytestmark = pytest.mark.property
+
 COMMANDS = [
     "run", "record", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
     "identify-frame", "calibrate", "simulate", "close-loop", "benchmark", "reproduce", "report", "export", "init",

@@ -10,6 +10,8 @@ from mrpipe.artifacts import config_directory
 from mrpipe.config.loader import load_config
 from mrpipe.errors import UserError
 
+pytestmark = pytest.mark.property
+
 FAULTS = {
     "unknown section": ("prepair:\n  order: 2\n", "line 1, prepair: unknown key; did you mean prepare?"),
     "unknown key": (

@@ -14,6 +14,8 @@ from mrpipe.config.model import config_model, options
 from mrpipe.pipeline.stage import Stage
 from mrpipe.stages.registry import all_stages
 
+pytestmark = pytest.mark.property
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "mrpipe"
 LEAVES = [name for name, _, default in options() if not hasattr(default, "model_dump")]

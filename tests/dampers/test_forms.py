@@ -268,6 +268,7 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
     return force
 
 
+@pytest.mark.property
 def test_every_form_of_the_library_is_tested() -> None:
     assert set(base_forms()) == set(NUMBERS)
     assert set(form_names()) == set(NUMBERS), "a file is named as its form"

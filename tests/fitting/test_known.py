@@ -53,6 +53,7 @@ def test_a_coupled_form_reads_the_known_laws_and_a_form_of_another_file_is_not_k
     assert known_start(problem, {form.name: replace(model, form_file="mine.py")}) is None
 
 
+@pytest.mark.property
 def test_the_fit_to_all_samples_counts_where_an_artifact_has_both(tmp_path: Path) -> None:
     model = damper_model(plain_fit("accumulator"), "A")
     other = replace(model, parameters={**model.parameters, "yield_displacement": 0.5})

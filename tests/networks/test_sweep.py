@@ -132,7 +132,9 @@ def test_time_left_and_cost_are_told() -> None:
 @pytest.mark.property
 def test_larger_networks_are_predicted_to_cost_more() -> None:
     candidates = [replace(CENTRE, hidden=(2,)), CENTRE, replace(CENTRE, hidden=(24, 24))]
-    screening, refining = predicted_costs(bench_history(), candidates, TINY.changed(screen_rows=2000))
+    screening, refining = predicted_costs(
+        bench_history(), candidates, TINY.changed(screen_rows=2000), np.random.default_rng(1)
+    )
     assert screening[0] < screening[2]
     assert refining[0] < refining[2]
 

@@ -24,6 +24,7 @@ from mrpipe.pipeline.stage import StageContext
 from .conftest import CALLS, STAGES, MakePipeline, with_run
 
 
+@pytest.mark.property
 def test_builds_what_is_missing_and_nothing_else(make_pipeline: MakePipeline) -> None:
     assert make_pipeline().build("second").what == "built"
     assert CALLS == ["first", "second"]
@@ -33,6 +34,7 @@ def test_builds_what_is_missing_and_nothing_else(make_pipeline: MakePipeline) ->
     assert again.outcomes["first"].manifest.warnings == ["the first is only a test"]
 
 
+@pytest.mark.property
 def test_summary_survives_reuse_and_is_plain_json(make_pipeline: MakePipeline) -> None:
     first = make_pipeline().build("first").manifest.summary
     assert make_pipeline().build("first").manifest.summary == first == {"rms_m": 1.5, "not_finite": None}
@@ -44,6 +46,7 @@ STALE = {
 }
 
 
+@pytest.mark.property
 @pytest.mark.parametrize("cause", STALE)
 def test_change_is_named_and_built_again(cause: str, make_pipeline: MakePipeline) -> None:
     changes, reason = STALE[cause]
@@ -55,11 +58,13 @@ def test_change_is_named_and_built_again(cause: str, make_pipeline: MakePipeline
     assert changed.outcomes["first"].reasons == [reason]
 
 
+@pytest.mark.property
 def test_setting_that_no_stage_reads_makes_nothing_stale(make_pipeline: MakePipeline) -> None:
     make_pipeline().build("second")
     assert make_pipeline(execution={"jobs": 3}, prepare={"order": 3}).build("second").what == "reused"
 
 
+@pytest.mark.property
 def test_same_numbers_built_again_leave_the_next_stage_alone(make_pipeline: MakePipeline) -> None:
     make_pipeline().build("second")
     forced = make_pipeline()
@@ -68,6 +73,7 @@ def test_same_numbers_built_again_leave_the_next_stage_alone(make_pipeline: Make
     assert CALLS == ["first", "second", "first"]
 
 
+@pytest.mark.property
 @pytest.mark.parametrize("harm", ["remove", "change"])
 def test_output_harmed_by_other_hands_is_built_again(harm: str, make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
@@ -88,6 +94,7 @@ def test_output_harmed_by_other_hands_is_built_again(harm: str, make_pipeline: M
     assert again.build("first").reasons == [expected]
 
 
+@pytest.mark.property
 def test_the_artifact_of_a_stale_stage_is_not_called_missing(make_pipeline: MakePipeline) -> None:
     """`input first is missing` sends people to look for a file that is there."""
     make_pipeline().build("second")
@@ -97,6 +104,7 @@ def test_the_artifact_of_a_stale_stage_is_not_called_missing(make_pipeline: Make
     assert make_pipeline().status(["second"])["second"] == ["first, which it reads, is stale"]
 
 
+@pytest.mark.property
 def test_code_change_is_named(make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
     pipeline.build("first")
@@ -107,12 +115,14 @@ def test_code_change_is_named(make_pipeline: MakePipeline) -> None:
     assert make_pipeline().status(["first"])["first"] == ["code of mrpipe.signals changed"]
 
 
+@pytest.mark.property
 def test_code_version_follows_imports_but_not_the_runner() -> None:
     version = code_version("mrpipe.structures.frame")
     assert {"mrpipe.structures.frame", "mrpipe.artifacts.hdf5", "mrpipe.errors"} <= set(version)
     assert not any(name.startswith(("mrpipe.pipeline", "mrpipe.cli", "mrpipe.config")) for name in version)
 
 
+@pytest.mark.property
 def test_stage_without_campaign_is_skipped_with_all_after_it(make_pipeline: MakePipeline) -> None:
     outcome = make_pipeline().build("after")
     assert outcome.what == "skipped"
@@ -129,6 +139,7 @@ def test_nothing_is_built_for_a_stage_that_lacks_a_campaign(make_pipeline: MakeP
     assert CALLS == []
 
 
+@pytest.mark.property
 def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -> None:
     assert make_pipeline().build("third").what == "built"
     assert CALLS == ["first", "second", "third"]
@@ -157,6 +168,7 @@ def test_a_setting_may_ask_for_a_further_input(make_pipeline: MakePipeline) -> N
     assert CALLS == ["third", "first", "second", "third"]
 
 
+@pytest.mark.property
 def test_the_settings_that_make_a_stage_need_a_campaign_are_named(make_pipeline: MakePipeline) -> None:
     demands = (("calibrate.damper", "identified", "shaken"), ("calibrate.expected_amplitude_m", None, "shaken"))
     third = replace(STAGES["third"], optional_inputs=(), conditional_inputs=demands)
@@ -167,12 +179,14 @@ def test_the_settings_that_make_a_stage_need_a_campaign_are_named(make_pipeline:
     )
 
 
+@pytest.mark.property
 def test_optional_inputs_serve_together_so_one_that_lacks_spares_all(make_pipeline: MakePipeline) -> None:
     stages = {**STAGES, "third": replace(STAGES["third"], optional_inputs=("second", "campaign:frame"))}
     assert make_pipeline(stages).build("third").what == "skipped"
     assert CALLS == ["third"]
 
 
+@pytest.mark.property
 def test_beside_a_given_campaign_nothing_is_built_for_optional_inputs_that_would_have_to_be_recorded(
     make_pipeline: MakePipeline,
 ) -> None:
@@ -187,6 +201,7 @@ def test_beside_a_given_campaign_nothing_is_built_for_optional_inputs_that_would
     assert CALLS == ["third"]
 
 
+@pytest.mark.property
 def test_undeclared_setting_is_refused(make_pipeline: MakePipeline) -> None:
     def run(context: StageContext) -> Mapping[str, Any]:
         return {"order": context.settings.prepare.order}
@@ -195,6 +210,7 @@ def test_undeclared_setting_is_refused(make_pipeline: MakePipeline) -> None:
         make_pipeline(with_run("first", run)).build("first")
 
 
+@pytest.mark.property
 def test_failure_leaves_the_old_artifact_and_no_rubbish(make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
     pipeline.build("first")
@@ -213,6 +229,7 @@ def test_failure_leaves_the_old_artifact_and_no_rubbish(make_pipeline: MakePipel
     assert make_pipeline(seed=3).build("first").what == "built"
 
 
+@pytest.mark.property
 def test_same_seed_gives_the_same_artifact_and_another_does_not(make_pipeline: MakePipeline, tmp_path: Path) -> None:
     digests = []
     for seed in (1, 1, 2):
@@ -223,6 +240,7 @@ def test_same_seed_gives_the_same_artifact_and_another_does_not(make_pipeline: M
     assert digests[0] == digests[1] != digests[2]
 
 
+@pytest.mark.property
 def test_artifact_carries_its_provenance(make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
     pipeline.build("second")
@@ -232,6 +250,7 @@ def test_artifact_carries_its_provenance(make_pipeline: MakePipeline) -> None:
     assert json.loads(root["inputs"]) == {"first.h5": sha256_of(pipeline.run_directory / "first.h5")}
 
 
+@pytest.mark.property
 def test_second_run_in_the_same_directory_is_refused(tmp_path: Path) -> None:
     import subprocess
     import sys
@@ -250,21 +269,25 @@ def test_second_run_in_the_same_directory_is_refused(tmp_path: Path) -> None:
     assert "got it" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
+@pytest.mark.property
 def test_broken_manifest_counts_as_none(tmp_path: Path) -> None:
     (tmp_path / "first.json").write_text('{"stage": "first"')
     assert Manifest.load(tmp_path, "first") is None
 
 
+@pytest.mark.property
 def test_json_is_strict() -> None:
     assert json.loads(to_json({"a": float("inf"), "b": (1, 2)})) == {"a": None, "b": [1, 2]}
     assert plain({"p": Path("x")}) == {"p": "x"}
 
 
+@pytest.mark.property
 def test_missing_artifact_is_told(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such artifact; run the stage that writes it"):
         Artifact(tmp_path / "none.h5")
 
 
+@pytest.mark.property
 @pytest.mark.parametrize("harm", ["remove", "change"])
 def test_a_harmed_part_of_the_report_is_built_again(harm: str, make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
@@ -282,6 +305,7 @@ def test_a_harmed_part_of_the_report_is_built_again(harm: str, make_pipeline: Ma
     assert CALLS == ["first", "second", "second"]
 
 
+@pytest.mark.property
 @pytest.mark.parametrize("content", ["", "null", "[]", '{"stage": 1}', '{"outputs": 5}'])
 def test_a_damaged_manifest_counts_as_none(content: str, make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
@@ -295,6 +319,7 @@ def test_a_damaged_manifest_counts_as_none(content: str, make_pipeline: MakePipe
     assert again.build("first").what == "built"
 
 
+@pytest.mark.property
 def test_a_damaged_artifact_is_built_again(make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
     pipeline.build("second")
@@ -323,6 +348,7 @@ def _fails(context: StageContext) -> Mapping[str, Any]:
     raise UserError("data.csv", "row 3", "is not a number", "write a number")
 
 
+@pytest.mark.property
 def test_a_failure_leaves_out_only_what_depends_on_it(make_pipeline: MakePipeline) -> None:
     broken = replace(STAGES["first"], name="broken", run=_fails, outputs=("broken.h5",))
     needs = replace(STAGES["second"], name="needs", inputs=("broken",), outputs=("needs.h5",))
@@ -353,6 +379,7 @@ def test_a_stage_that_ran_without_an_optional_input_is_up_to_date(make_pipeline:
     assert make_pipeline(stages).status(["alone"]) == {"alone": [], "second": ["never built"]}
 
 
+@pytest.mark.property
 def test_an_optional_input_that_fails_is_done_without(make_pipeline: MakePipeline) -> None:
     stages = with_run("second", _fails)
     pipeline = make_pipeline({**stages, "third": replace(STAGES["first"], optional_inputs=("second",))})
@@ -382,6 +409,7 @@ def test_a_preferred_input_is_built_and_done_without_where_it_is_skipped_or_fail
         assert pipeline.outcomes["second"].what == ("failed" if broken is _fails else "skipped")
 
 
+@pytest.mark.property
 def test_wrong_settings_of_a_preferred_input_end_the_command(make_pipeline: MakePipeline) -> None:
     def check(settings: object) -> None:
         raise UserError("config.yaml", "form", "is not known", "name another one")
@@ -396,6 +424,7 @@ def _skips(context: StageContext) -> Mapping[str, Any]:
     raise StageSkipped("no training test")
 
 
+@pytest.mark.property
 def test_a_full_disk_ends_the_run(make_pipeline: MakePipeline) -> None:
     import errno
 
@@ -408,6 +437,7 @@ def test_a_full_disk_ends_the_run(make_pipeline: MakePipeline) -> None:
         pipeline.build("first")
 
 
+@pytest.mark.property
 def test_a_part_that_fails_leaves_the_other_results(make_pipeline: MakePipeline) -> None:
     def run(context: StageContext) -> Mapping[str, Any]:
         context.fail("the closed loop", UserError("simulate", "amplitude", "is not found", "give one"))
@@ -419,6 +449,7 @@ def test_a_part_that_fails_leaves_the_other_results(make_pipeline: MakePipeline)
     assert make_pipeline(with_run("first", run)).build("first").what == "reused"
 
 
+@pytest.mark.property
 def test_what_a_killed_process_left_is_removed_under_the_lock(tmp_path: Path) -> None:
     rubbish = [tmp_path / ".prepared.h5.123.tmp", tmp_path / "figures" / ".a.png.7.tmp"]
     folders = [tmp_path / ".bench.99.tmp", tmp_path / ".bench.99.old.tmp"]

@@ -8,6 +8,8 @@ import pytest
 
 from mrpipe.reporting.bench_tracing import in_plain_words
 
+pytestmark = pytest.mark.property
+
 
 def _effect(name: str, tied_with: list[str]) -> dict[str, Any]:
     return {

@@ -30,6 +30,7 @@ def stages(tmp_path: Path) -> list[ReportStage]:
     ]
 
 
+@pytest.mark.property
 def test_html_is_one_offline_file(tmp_path: Path, stages: list[ReportStage]) -> None:
     (path,) = write_report(RunFacts(tmp_path, "T & x", "", stages), ["html"])
     text = path.read_text(encoding="utf-8")
@@ -43,6 +44,7 @@ def test_html_is_one_offline_file(tmp_path: Path, stages: list[ReportStage]) -> 
     assert "12.35" in text
 
 
+@pytest.mark.property
 def test_markdown_shows_tables_and_figures(tmp_path: Path, stages: list[ReportStage]) -> None:
     (path,) = write_report(RunFacts(tmp_path, "T", "d", stages), ["markdown"])
     text = path.read_text(encoding="utf-8")
@@ -51,6 +53,7 @@ def test_markdown_shows_tables_and_figures(tmp_path: Path, stages: list[ReportSt
     assert "Skipped: there is no frame campaign" in text
 
 
+@pytest.mark.property
 def test_same_figure_is_the_same_file(tmp_path: Path) -> None:
     contents = []
     for name in ("a", "b"):
@@ -61,12 +64,14 @@ def test_same_figure_is_the_same_file(tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
+@pytest.mark.property
 def test_missing_figure_is_said(tmp_path: Path, stages: list[ReportStage]) -> None:
     (tmp_path / "figures" / "prepare-loop.svg").unlink()
     (path,) = write_report(RunFacts(tmp_path, "T", "", stages), ["html"])
     assert "is missing: build the stage again" in path.read_text(encoding="utf-8")
 
 
+@pytest.mark.property
 def test_a_cell_that_holds_a_list_is_written_as_words(tmp_path: Path) -> None:
     part = PartWriter("identify-damper", tmp_path)
     part.table("forms", pd.DataFrame({"form": ["dahl", "lugre"], "at bound": [["k0", "c1"], []]}), "Forms")
@@ -77,6 +82,7 @@ def test_a_cell_that_holds_a_list_is_written_as_words(tmp_path: Path) -> None:
     assert "| dahl | k0, c1 |" in text and "[" not in (tmp_path / "tables" / "identify-damper-forms.csv").read_text()
 
 
+@pytest.mark.property
 def test_a_number_is_not_parted_from_its_unit(tmp_path: Path, stages: list[ReportStage]) -> None:
     facts = RunFacts(
         tmp_path, "T", "", [replace(stages[0], items=[{"kind": "text", "text": "1.8 % of 34 N, 5 of 7 A."}])]
@@ -100,6 +106,7 @@ def test_a_warning_appears_once_and_one_matrix_has_one_notation(tmp_path: Path, 
         assert "9569" in text and "10190" in text and "e+04" not in text
 
 
+@pytest.mark.property
 def test_a_bar_in_the_name_of_a_campaign_keeps_the_row_of_its_stage_whole(
     tmp_path: Path, stages: list[ReportStage]
 ) -> None:

@@ -89,6 +89,16 @@ def test_further_units_and_decimal_commas(tmp_path: Path) -> None:
 
 
 @pytest.mark.golden
+def test_decimal_commas_between_blanks_do_not_separate_columns(tmp_path: Path) -> None:
+    path = tmp_path / "record.txt"
+    rows = "\n".join(f"{t:.4f}\t{a * GRAVITY:.6f}".replace(".", ",") for t, a in zip(TIME, SIGNAL, strict=True))
+    path.write_text(f"Zeit [s]\ta [m/s^2]\n{rows}\n")
+    motion = read_motion(path)
+    assert motion.components == 1
+    np.testing.assert_allclose(motion.acceleration_m_s2[:, 0], SIGNAL * GRAVITY, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.golden
 def test_matlab_rows_of_time_and_acceleration(tmp_path: Path) -> None:
     savemat(tmp_path / "a.mat", {"record": np.stack([TIME, SIGNAL * GRAVITY])})
     motion = read_motion(tmp_path / "a.mat")

@@ -25,9 +25,9 @@ class Finding:
     severity
         `error` if results would almost certainly be wrong, `warning` if the user should check the data.
     sentence
-        What was found, with its numbers, in plain English.
+        The finding with its numbers, in plain English.
     remedy
-        What the user can do.
+        A sentence that says what the user can do.
     test
         Name of the test; empty where the finding concerns the whole campaign.
     channel

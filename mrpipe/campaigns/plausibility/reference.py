@@ -160,7 +160,7 @@ class ReferenceMap:
     Parameters
     ----------
     tests
-        At least two tests.
+        Tests that are compared; at least two.
     """
 
     def __init__(self, tests: Sequence[Slow]) -> None:

@@ -20,7 +20,7 @@ _DRIVE = re.compile(r"(?<![A-Za-z\d.,])(\d+(?:[.,p]\d+)?)\s*_?(mA|A|V)(?![A-Za-z
 
 @dataclass(frozen=True)
 class Condition:
-    """What a bench test does: mean frequency [Hz], RMS displacement, mean and spread of the drive (any unit)."""
+    """Motion and drive of a bench test: mean frequency [Hz], RMS displacement [m], mean and spread of the drive."""
 
     frequency: float
     amplitude: float
@@ -28,7 +28,7 @@ class Condition:
     drive_spread: float
 
     def like(self, other: Condition, largest_drive: float) -> bool:
-        """Whether another test repeats this one."""
+        """Return whether another test repeats this one."""
         return (
             abs(self.frequency - other.frequency) <= 0.08 * max(self.frequency, other.frequency)
             and abs(self.amplitude - other.amplitude) <= 0.08 * max(self.amplitude, other.amplitude)

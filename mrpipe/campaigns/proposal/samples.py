@@ -41,7 +41,7 @@ def _follows(cause: FloatArray, effect: FloatArray) -> float:
 
 
 def has_few_levels(values: FloatArray) -> bool:
-    """Whether samples rest on a few levels: half of them lie within 1 % of the range around three values at most."""
+    """Return whether samples rest on a few levels: half of them lie within 1 % of the range of at most three values."""
     span = float(np.ptp(values))
     if span <= 0.02 * float(np.abs(values).max()):
         return True

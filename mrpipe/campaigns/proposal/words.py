@@ -59,7 +59,7 @@ _LETTERS = {"α": "a", "β": "b", "δ": "d", "ł": "l", "ø": "o", "ß": "ss", "
 
 @dataclass(frozen=True)
 class Header:
-    """What a header says.
+    """Quantity, unit and place that a header states.
 
     Attributes
     ----------

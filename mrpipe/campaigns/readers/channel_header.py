@@ -127,7 +127,7 @@ def interval_s(path: Path, said: str, header: str, count: int) -> float:
     Parameters
     ----------
     path
-        For messages.
+        The file, for messages.
     said, header
         The line before the samples, and the lines before it.
     count

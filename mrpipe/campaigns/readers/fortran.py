@@ -49,7 +49,7 @@ def required_row(
     line, width
         See :func:`row_of_numbers`.
     remedy
-        What the message advises.
+        Remedy that the message advises.
 
     Raises
     ------

@@ -31,7 +31,7 @@ MOST_MAPPINGS = 500
 
 @dataclass(frozen=True)
 class Reader:
-    """How files of some endings are read.
+    """Reader of files with certain endings.
 
     Attributes
     ----------

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
+from mrpipe.case_studies.laws import LawGains
 from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
@@ -21,29 +21,6 @@ from mrpipe.case_studies.model import ModalModel
 from mrpipe.case_studies.options import LqgWeights
 
 
-@dataclass(frozen=True)
-class IsolationGains:
-    """Gains of the collocated laws, the same along x and y.
-
-    Attributes
-    ----------
-    viscous
-        c of VD [N s/m].
-    negative_stiffness, negative_viscous
-        k_d [N/m] and c [N s/m] of VDNS.
-    friction
-        alpha of FDNS [N/m], by its energy-equivalent viscous damper (4.21) to (4.24).
-    damping_ratio
-        What all three give the isolation modes.
-    """
-
-    viscous: float
-    negative_stiffness: float
-    negative_viscous: float
-    friction: float
-    damping_ratio: float
-
-
 def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: float) -> float:
     """Return alpha [N/m] of FDNS that gives the two lowest modes a damping ratio: c = 4 alpha/(pi w), k = -alpha.
 
@@ -52,7 +29,7 @@ def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: f
     modal
         The building.
     ratio
-        Wanted damping ratio.
+        Damping ratio that both modes shall have.
     omega
         Frequency of the isolation [rad/s].
     scale
@@ -70,22 +47,25 @@ def friction_for_damping(modal: ModalModel, ratio: float, omega: float, scale: f
 
 def isolation_gains(
     building: IsolatedBuilding, modal: ModalModel, *, damping_ratio: float, stiffness_share: float
-) -> IsolationGains:
-    """Calibrate the laws on the isolation modes by complex eigenvalues.
+) -> LawGains:
+    """Calibrate the laws on the isolation modes by complex eigenvalues; the gains are the same along x and y.
+
+    Each of the three laws gives the two lowest modes the same damping ratio. FDNS is represented by its
+    energy-equivalent viscous damper (4.21) to (4.24).
 
     Parameters
     ----------
     building, modal
         The building and all its modes.
     damping_ratio
-        Wanted of the two lowest modes.
+        Damping ratio that the two lowest modes shall have.
     stiffness_share
         Share of the isolation's stiffness that VDNS takes away.
     """
     omega = 2.0 * np.pi / building.isolation_period_s
     critical = 2.0 * omega * building.model.total_mass_kg
     k = -stiffness_share * float(building.isolation_stiffness[0, 0])
-    return IsolationGains(
+    return LawGains(
         viscous=viscous_for_damping(modal, 0.0, damping_ratio, critical, modes=2),
         negative_stiffness=k,
         negative_viscous=viscous_for_damping(modal, k, damping_ratio, critical, modes=2),
@@ -142,7 +122,7 @@ def isolation_lqg(
     building, modal
         The building and all its modes.
     weights
-        What the design weighs.
+        Weights of displacement, acceleration and force.
     """
     A, B = modal.state_matrix(), modal.input_matrix(modal.devices)
     regulated, measured = isolation_outputs(building, modal)

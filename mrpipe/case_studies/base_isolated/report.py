@@ -22,12 +22,12 @@ from mrpipe.structures.records import GroundMotion
 
 @dataclass(frozen=True)
 class IsolationResult:
-    """All that was run.
+    """Results of all runs of the base-isolated building.
 
     Attributes
     ----------
     study, motion, uncontrolled, cases
-        Of the main motion.
+        The study, the main motion, and the runs under it without dampers and under each law.
     motions
         Motion -> law -> indices, for those of the seven motions that were requested.
     sweep_law, sweep

@@ -39,7 +39,7 @@ class IsolatedBuilding:
     base_mass
         Shape (3, 3).
     isolation_stiffness, isolation_damping
-        Of all bearings about the centre of mass, shape (3, 3).
+        Stiffness and damping of all bearings about the centre of mass, shape (3, 3).
     bearings_m
         Positions about the centre of mass, shape (92, 2); the corners of the plan where the file does not give them.
     """
@@ -125,7 +125,7 @@ def isolated_building(
     Parameters
     ----------
     mass, damping, stiffness
-        Of the superstructure, shape (24, 24), SI.
+        Matrices of the superstructure, shape (24, 24), SI.
     base_mass
         Shape (3, 3).
     isolation
@@ -133,7 +133,7 @@ def isolated_building(
     bearings_m
         Positions, shape (n, 2).
     origin, source
-        See :class:`BenchmarkModel`.
+        Origin and source of the numbers, see :class:`BenchmarkModel`.
     """
     spread = np.tile(np.eye(3), (FLOORS, 1))
     moved = base_mass + spread.T @ mass @ spread
@@ -172,7 +172,7 @@ def published_building(
     path
         The file; `bearing_locations_id_x_y_m.csv` in the same folder gives the positions.
     bearing_stiffness, bearing_viscosity
-        Of each of the 92 linear bearings [N/m], [N s/m].
+        Stiffness and viscosity of each of the 92 linear bearings [N/m], [N s/m].
 
     Raises
     ------
@@ -290,7 +290,7 @@ def building_of(
     surrogate
         Parameter set of the surrogate.
     bearing_stiffness, bearing_viscosity
-        Of each bearing of the published model [N/m], [N s/m].
+        Stiffness and viscosity of each bearing of the published model [N/m], [N s/m].
 
     Raises
     ------

@@ -9,10 +9,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.case_studies.base_isolated.design import IsolationGains, isolation_gains, isolation_lqg
+from mrpipe.case_studies.base_isolated.design import isolation_gains, isolation_lqg
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
-from mrpipe.case_studies.laws import controller_of
+from mrpipe.case_studies.laws import LawGains, controller_of
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -31,7 +31,7 @@ REASON = (
 """Why our figures differ from the printed ones."""
 
 STRUCTURE = "the base-isolated building"
-"""What messages call it."""
+"""Name of the structure in messages."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class IsolationStudy:
 
     building: IsolatedBuilding
     modal: ModalModel
-    gains: IsolationGains
+    gains: LawGains
     device: BinghamDevice
     network: Network | None
     observer: SampledController
@@ -141,7 +141,7 @@ def isolation_study(
 
 @dataclass(frozen=True)
 class IsolationCase:
-    """One law under one motion."""
+    """Run of the building under one law and one motion."""
 
     motion: str
     law: str
@@ -172,7 +172,7 @@ def run_cases(
     motion
         Two components.
     laws
-        Of :data:`~mrpipe.case_studies.laws.LAWS`.
+        Names of laws of :data:`~mrpipe.case_studies.laws.LAWS`.
     jobs
         Threads: the compiled loop runs free of the interpreter.
     """

@@ -9,6 +9,7 @@ from joblib import Parallel, delayed
 
 from mrpipe.case_studies.gains import TwoComponent, exact_viscous, lowest_damping, two_component
 from mrpipe.case_studies.indices import FloorResponse, largest, ten_storey_indices
+from mrpipe.case_studies.laws import PASSIVE, constant_voltage
 from mrpipe.case_studies.model import BenchmarkModel, ModalModel, modal_model
 from mrpipe.case_studies.run import BinghamDevice, Controller, Realisation, Response, simulate
 from mrpipe.dampers.plant import Chain
@@ -29,14 +30,14 @@ VARIANTS = ("filtered", "unfiltered", "ideal", "clipped")
 
 @dataclass(frozen=True)
 class TenStoreyGains:
-    """What the laws are set to.
+    """Gains of the laws, and the limits from which they follow.
 
     Attributes
     ----------
     limits
-        Of the two-component reduction.
+        Limits of the reduction to two components.
     storey_stiffness_n_m
-        k.
+        Stiffness k of a storey [N/m].
     modal
         Limiting frequencies and modal flexibility of the target mode.
     """
@@ -81,13 +82,13 @@ def stiffness_share(law: str) -> float:
 def check_laws(laws: Sequence[str]) -> None:
     """Raise UserError if one of them is not a law of the frame."""
     for law in laws:
-        if law not in ("passive-off", "passive-on"):
+        if law not in PASSIVE:
             stiffness_share(law)
 
 
 @dataclass(frozen=True)
 class TenStoreyCase:
-    """One run.
+    """Run of the frame under one law in one variant.
 
     Attributes
     ----------
@@ -98,7 +99,7 @@ class TenStoreyCase:
     absolute
         J2 and J4 with absolute accelerations.
     response
-        Histories.
+        Histories of the run.
     """
 
     law: str
@@ -150,8 +151,8 @@ class TenStoreyStudy:
 
     def controller(self, law: str, variant: str, dampers: float = 1.0) -> Controller:
         """Return the controller of a law in a variant."""
-        if law in ("passive-off", "passive-on"):
-            volts = 0.0 if law == "passive-off" else self.device.highest_voltage
+        if law in PASSIVE:
+            volts = constant_voltage(law, self.device)
             return Controller("constant", "chain", voltage=volts, dampers=dampers, device=self.device, chain=self.chain)
         viscous, stiffness = self.gains.of(law)
         realisation: Realisation = {"ideal": "active", "clipped": "semi-active"}.get(variant, "chain")  # type: ignore[assignment]
@@ -164,7 +165,7 @@ class TenStoreyStudy:
     def case(
         self, law: str, variant: str = "filtered", dampers: float = 1.0, ratio: int | None = None
     ) -> TenStoreyCase:
-        """Run one law."""
+        """Run one law and return its indices."""
         response = self.run(self.controller(law, variant, dampers), ratio)
         free = self.uncontrolled if ratio in (None, self.ratio) else self.run(Controller(), ratio)
         relative = ten_storey_indices(floors(response), floors(free))
@@ -172,7 +173,7 @@ class TenStoreyStudy:
         return TenStoreyCase(law, variant, relative, {key: absolute[key] for key in ("J2", "J4")}, response)
 
     def run(self, controller: Controller, ratio: int | None = None) -> Response:
-        """Run the frame."""
+        """Run the frame under the motion with a controller."""
         loads = self.motion.acceleration_m_s2[:, :1]
         return simulate(self.modal, loads, self.motion.interval_s, controller, ratio=ratio or self.ratio)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrpipe.case_studies.gains import exact_viscous, lowest_damping, two_component
 from mrpipe.case_studies.indices import WIND_FLOORS
+from mrpipe.case_studies.laws import LawGains
 from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
@@ -29,28 +30,15 @@ SENSOR_DENSITY = 1e-4
 
 
 @dataclass(frozen=True)
-class WindGains:
-    """Gains of the collocated laws.
+class WindGains(LawGains):
+    """Gains of the laws of the tower; with a tuned mass the damping ratio is the smaller one of its two modes.
 
     Attributes
     ----------
-    viscous
-        c of VD [N s/m].
-    negative_stiffness, negative_viscous
-        k_d [N/m] and c [N s/m] of VDNS.
-    friction
-        alpha of FDNS [N/m].
-    damping_ratio
-        Of the first mode under ideal VD, complex eigenvalue; for a tuned mass the smaller of its two modes.
     capacity_share
         Factor on the optimal gains of VD that reduces them to the force of the dampers.
     """
 
-    viscous: float
-    negative_stiffness: float
-    negative_viscous: float
-    friction: float
-    damping_ratio: float
     capacity_share: float = 1.0
 
     def within(self, capacity_n: float, velocity_m_s: float, displacement_m: float) -> WindGains:
@@ -135,9 +123,9 @@ def wind_lqg(modal: ModalModel, weights: LqgWeights, load: WindLoad) -> tuple[Sa
     modal
         The tower's kept modes.
     weights
-        What the design weighs: floor displacements and accelerations.
+        Weights of floor displacements and accelerations.
     load
-        Its variance sets the disturbance.
+        Wind load, whose variance is that of the disturbance.
 
     Raises
     ------

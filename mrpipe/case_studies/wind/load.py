@@ -95,11 +95,11 @@ def synthetic_wind(
     rng
         Source of the amplitudes.
     floors, height_m, width_m
-        Of the building.
+        Number of floors, height and width of the building.
     duration_s, interval_s
         Length and sampling interval [s].
     climate
-        The wind.
+        Parameters of the wind.
     """
     climate = climate or WindClimate()
     samples = round(duration_s / interval_s) + 1
@@ -146,7 +146,7 @@ def read_wind(path: Path, floors: int, *, unit: str = "kN", interval_s: float | 
     floors
         Columns expected, one more with a clock.
     unit
-        Of the forces.
+        Unit of the forces.
     interval_s
         Sampling interval if the file has no clock [s].
 

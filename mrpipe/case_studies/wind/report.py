@@ -19,7 +19,7 @@ from mrpipe.reporting.sink import Sink
 
 @dataclass(frozen=True)
 class WindResult:
-    """All that was run.
+    """Results of all runs of the tower.
 
     Attributes
     ----------

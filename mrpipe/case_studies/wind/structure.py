@@ -45,7 +45,7 @@ def element_matrices(stiffness: float, mass: float, length: float) -> tuple[Floa
     mass
         Per length [kg/m].
     length
-        m.
+        Length of the element [m].
     """
     L = length
     K = np.array(
@@ -75,7 +75,7 @@ def condensed_cantilever(stiffnesses: FloatArray, masses: FloatArray, length: fl
     stiffnesses, masses
         EI [N m^2] and mass per length [kg/m] of each storey, shape (n,).
     length
-        Of a storey [m].
+        Height of a storey [m].
     """
     n = len(stiffnesses)
     K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))
@@ -105,7 +105,7 @@ def calibrated_stiffness(
     masses
         Per length [kg/m] of each storey, shape (n,).
     length
-        Of a storey [m].
+        Height of a storey [m].
     frequencies_hz
         Lowest natural frequencies, shape (m,).
     """
@@ -140,7 +140,7 @@ class Tower:
     model
         76 floors (77 degrees of freedom with a tuned mass); loads are the floors' wind forces [N].
     position
-        Where the device works.
+        Place where the device works.
     """
 
     model: BenchmarkModel
@@ -251,7 +251,7 @@ def with_tuned_mass(tower: Tower, mass_kg: float, frequency_ratio: float) -> Tow
     tower
         76 floors.
     mass_kg
-        Of the tuned mass; 500 t in the original benchmark.
+        Mass of the tuned mass [kg]; 500 t in the original benchmark.
     frequency_ratio
         Frequency of the tuned mass over the first one of the tower.
     """

@@ -30,10 +30,11 @@ REASON = (
 """Why our figures differ from the printed ones."""
 
 FADE_SHARE = 0.01
-"""Of the uncontrolled rod's peak velocity: commands fade below it. Not at a tuned mass, whose rod always moves."""
+"""Share of the peak velocity of the rod in the uncontrolled tower; commands fade below this velocity. They do not fade
+at a tuned mass, whose rod always moves."""
 
 STRUCTURE = "the tower"
-"""What messages call it."""
+"""Name of the structure in messages."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +108,11 @@ def run_tower(modal: ModalModel, load: WindLoad, controller: Controller | None, 
     Parameters
     ----------
     modal
-        Its kept modes.
+        Modes of the tower that are kept.
     load
         Forces on the floors, straight between samples.
     controller
-        What drives its device; None for none.
+        Controller of the device; None: there is no device.
     time_step_s
         Longest step [s].
     """
@@ -189,7 +190,7 @@ def wind_study(
 
 @dataclass(frozen=True)
 class WindCase:
-    """One law."""
+    """Run of the tower under one law."""
 
     law: str
     indices: dict[str, float]

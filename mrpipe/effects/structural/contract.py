@@ -68,7 +68,7 @@ class StructuralEffect(Described):
     Attributes
     ----------
     acts_on
-        Where it acts.
+        Place where the effect acts.
     forms
         One or several functional shapes.
     places

@@ -183,7 +183,7 @@ def physical(poles: NDArray[np.complex128], shapes: NDArray[np.complex128], orde
     order
         Model order.
     records
-        For the band.
+        Records, which determine the band.
     """
     found = []
     for pole, shape in zip(poles, shapes.T, strict=True):

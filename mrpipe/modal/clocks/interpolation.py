@@ -61,7 +61,7 @@ def between_samples(values: FloatArray, sampling_rate_hz: float) -> Interpolatio
     values
         Samples, shape (n,); the first is at time zero.
     sampling_rate_hz
-        [Hz].
+        Sampling rate [Hz].
     """
     taps = firwin(2 * _REACH * _FINER + 1, 1.0 / _FINER, window=("kaiser", _SHAPE))
     # the ends are continued as an odd reflection, so that neither value nor slope jumps there

@@ -71,7 +71,7 @@ class DecayResult:
     logarithmic_decrement, exponential_fit, point_to_point
         Damping ratio [1] by each method.
     angular_frequency
-        Of the exponential fit [rad/s].
+        Angular frequency of the exponential fit [rad/s].
     peak_time_s, peak
         Peaks of the band-passed modal coordinate in its decay, shape (k,); [s], [m/s2].
     point_to_point_series
@@ -143,7 +143,7 @@ def linear_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
     peak_time_s
         Times of the peaks of both signs, two in a period, shape (k,) [s].
     peak
-        Their heights, positive, shape (k,).
+        Heights of the peaks, positive, shape (k,).
     """
     clock = peak_time_s - peak_time_s[0]
     (slope, level), covariance = np.polyfit(clock, peak, 1, cov=True)
@@ -328,7 +328,7 @@ def analyse_decay(
     mode_shapes
         Shape (n, r), real.
     angular_frequencies, damping_ratios
-        Of all modes, shape (r,), from the forced tests; start of the fit.
+        Values of all modes from the forced tests, shape (r,), from which the fit starts.
     """
     rate = test.sampling_rate_hz
     coordinates = modal_coordinates(test, mode_shapes, angular_frequencies)

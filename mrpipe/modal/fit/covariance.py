@@ -9,7 +9,7 @@ from mrpipe.modal.fit.projected import ProjectedFit
 
 
 def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
-    """Covariance of theta that allows for noise of the excitation, which reaches all outputs through H.
+    """Return the covariance of theta with noise of the excitation, which reaches all outputs through H.
 
     A lightly damped peak has too few lines to estimate their scatter. The larger one of this scatter and the variance
     predicted from the noise of the whole band is taken.
@@ -40,7 +40,7 @@ def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
 
 
 def clustered_covariance(fit: ProjectedFit, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance of theta that allows for errors of a sensor which are the same at all lines of a peak in one test.
+    """Return the covariance of theta with errors of a sensor that are the same at all lines of a peak in one test.
 
     Errors of the clock of a sensor, or cross-talk, are the same from line to line, and the scatter of single lines does
     not show them. Each sensor in each test is therefore one cluster of the robust covariance (Liang and Zeger 1986).

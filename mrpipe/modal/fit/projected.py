@@ -71,7 +71,7 @@ class ProjectedFit:
         return np.concatenate([state.residual for state in self.states(theta)])
 
     def compressed(self, theta: FloatArray) -> FloatArray:
-        """Triangle R of [J e]: a problem of a few rows with the same norm, gradient and J'J (exact compression)."""
+        """Return the triangle R of [J e], a problem of few rows with exactly the same norm, gradient and J'J."""
         jacobian, residual = self.jacobian(theta), self.residual(theta)
         cross = jacobian.T @ residual
         gram = np.block([[jacobian.T @ jacobian, cross[:, None]], [cross[None, :], np.array([[residual @ residual]])]])
@@ -86,7 +86,10 @@ class ProjectedFit:
         return np.vstack([state.jacobian for state in self.states(theta)])
 
     def renew_weights(self, theta: FloatArray) -> None:
-        """Noise of the excitation is amplified at the peaks: variance = s_y2 + |H|2 s_u2, estimated from residuals."""
+        """Estimate the weights again from the residuals, because the peaks amplify noise of the excitation.
+
+        The variance is s_y2 + |H|2 s_u2.
+        """
         for group, state in zip(self.groups, self.states(theta), strict=True):
             unweighted = self.complex_residual(group, state)
             response = np.abs(self.steady(group, state)) ** 2 / self.input_power(group)[:, None]
@@ -108,19 +111,19 @@ class ProjectedFit:
 
     @staticmethod
     def input_power(group: _Group) -> FloatArray:
-        """Squared magnitude of the inputs, each relative to its own scale, in the unit of the first, shape (rows,)."""
+        """Return the squared magnitude of the inputs over their scales, in the unit of the first, shape (rows,)."""
         scale = group.problem.scale
         power = np.sum(np.abs(np.concatenate(group.problem.excitations) / scale) ** 2, axis=1) * scale[0] ** 2
         return np.asarray(np.maximum(power, 1e-300))
 
     @staticmethod
     def complex_residual(group: _Group, state: State) -> ComplexArray:
-        """Residual of a group in the unit of its spectra."""
+        """Return the residual of a group in the unit of its spectra."""
         return group.target - state.basis @ (state.coefficients * group.sigma)
 
     @staticmethod
     def coefficient_errors(group: _Group, state: State) -> FloatArray:
-        """Standard errors of the coefficients of a group for responses of unit noise, shape (columns,)."""
+        """Return the standard errors of the coefficients of a group for responses of unit noise, shape (columns,)."""
         weight = np.concatenate([group.weight, group.weight])
         weighted = stack(state.basis) * weight[:, None]
         norms = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
@@ -129,7 +132,7 @@ class ProjectedFit:
 
     @staticmethod
     def steady(group: _Group, state: State) -> ComplexArray:
-        """H U of a group."""
+        """Return the steady response H U of a group."""
         problem = group.problem
         inputs = len(problem.inputs)
         columns = [mode * problem.width + k for mode in range(problem.modes) for k in range(2 * inputs)]

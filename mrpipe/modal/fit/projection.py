@@ -46,7 +46,7 @@ class Problem:
         self.turns = [np.exp(-1j * item.omega * item.dt) for item in spectra]
 
     def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
-        """Columns of one mode, shape (rows, 2 inputs + 2 tests): two of H U per input, a complex transient per test."""
+        """Return the columns of one mode, shape (rows, 2 inputs + 2 tests): two of H U per input, two per transient."""
         columns = np.zeros((self.total, self.width), dtype=np.complex128)
         start = 0
         count = 2 * len(self.inputs)
@@ -69,7 +69,7 @@ class Problem:
         return columns
 
     def smooth_columns(self) -> ComplexArray:
-        """Contributions of modes above the band, sensor offsets and drift inside the band: powers of i omega."""
+        """Return powers of i omega: contributions of modes above the band, of offsets, and of drift of sensors."""
         direct_columns = DIRECT_POWERS * len(self.inputs)
         columns = np.zeros((self.total, direct_columns + self.tests * (_TRANSIENT_POWERS + 1)), dtype=np.complex128)
         start = 0

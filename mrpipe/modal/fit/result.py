@@ -80,7 +80,7 @@ class MultiModeFit:
     other_poles: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
 
     def mode_coherence(self) -> FloatArray:
-        """Coherence at each peak, shape (r,): mean over floors, weighted by the squared shape."""
+        """Return the coherence at each peak, shape (r,): mean over floors, weighted by the squared shape."""
         weight = np.abs(self.residues) ** 2
         return np.asarray(np.sum(weight * self.coherence, axis=0) / np.maximum(np.sum(weight, axis=0), 1e-300))
 
@@ -106,7 +106,7 @@ class MultiModeFit:
         )
 
     def residual(self) -> ComplexArray:
-        """Part that neither excitation nor transients explain, all tests in one column, shape (sum m, n).
+        """Return the part that neither excitation nor transients explain, all tests in one column, shape (sum m, n).
 
         Zero where a test does not have a sensor.
         """

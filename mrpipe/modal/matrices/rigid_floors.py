@@ -83,7 +83,7 @@ def rigid_response(frame: Frame, test: FrameTest, positions: Mapping[str, tuple[
     test
         A test with a measured excitation of the ground or of shakers.
     positions
-        See :func:`measured_rows`.
+        Positions of the sensors, see :func:`measured_rows`.
     """
     floors = frame.floors // 3
     rows = measured_rows([(sensor.floor, sensor.direction) for sensor in test.sensors], positions, floors)

@@ -85,7 +85,7 @@ def fit_tridiagonal(
     frequency_error, shape_error
         Standard errors taken for the weights: relative, and of a shape with unit modal mass over its norm.
     bounds
-        Of each storey [N/m].
+        Bounds of the stiffness of each storey [N/m].
     """
     modes = _all_modes(mode_shapes, angular_frequencies, frequency_error, shape_error)
     return storeys_of(_updated(mass, modes, bounds), bounds)

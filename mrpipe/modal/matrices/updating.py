@@ -214,7 +214,7 @@ def update_model(
     start_mass
         First guess of unknown masses, one for all or shape (n,) [kg].
     bounds
-        Of each parameter; a wide range around the start if left out.
+        Bounds of each parameter; a wide range around the start if left out.
     """
     problem = _Problem(model, masses, modes, modes.numbers)
     theta = np.concatenate([np.log(start), np.log(np.broadcast_to(start_mass, masses.shape)[problem.unknown])])

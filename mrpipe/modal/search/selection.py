@@ -67,7 +67,7 @@ def all_floors_measured(fit: MultiModeFit, layout: Layout) -> bool:
 
 
 def strength(fit: MultiModeFit) -> FloatArray:
-    """Peak of each mode over noise, largest over sensors: |residue| / (2 zeta), shape (r,)."""
+    """Return the peak of each mode over noise, largest over sensors: |residue| / (2 zeta), shape (r,)."""
     peak = np.abs(fit.residues) / (2.0 * fit.damping_ratios)
     return np.asarray((peak / np.sqrt(fit.noise_variance)[:, None]).max(axis=0))
 

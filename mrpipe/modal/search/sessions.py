@@ -171,7 +171,7 @@ def difference(names: Sequence[str], poles: PolesOfTests, odd: Sequence[int] | N
     names
         Names of the tests.
     poles
-        Their poles.
+        Poles of the tests.
     odd
         Result of :func:`odd_tests`.
     """

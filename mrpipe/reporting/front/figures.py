@@ -28,7 +28,7 @@ class TestRun:
     Attributes
     ----------
     name
-        Of the test.
+        Name of the test.
     displacement, velocity, drive, time
         Channels.
     measured, before, after
@@ -130,7 +130,7 @@ def residual_over(
     before, after
         Measured minus modelled, shape (n,).
     unit
-        Of the residual.
+        Unit of the residual.
     """
     columns = min(2, max(len(variables), 1))
     rows = -(-len(variables) // columns)
@@ -239,7 +239,7 @@ def shapes_on_frame(shapes: FloatArray, frequencies_hz: Sequence[float], damping
     shapes
         A row for each floor, a column for each mode; any scale.
     frequencies_hz, damping_ratios
-        Of each mode.
+        Frequency and damping ratio of each mode.
     """
     floors, modes = shapes.shape
     shown = min(modes, 6)

@@ -34,7 +34,7 @@ class LawRun:
     peak_force_n
         Largest damper force [N]; NaN without a damper.
     damping_ratio
-        From the free decay after the excitation [1]; NaN where there is none.
+        Damping ratio from the free decay after the excitation [1]; NaN where there is none.
     outside_share
         Share of the time in which the damper model is extrapolated [1].
     """

@@ -30,6 +30,7 @@ from mrpipe.tracing.bench.residuals.nuisances import observation_window
 from mrpipe.tracing.bench.rivals.inner_springs import with_inner_springs
 from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
 from mrpipe.tracing.bench.rivals.linear_memory import without_beaten_names
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.needed import without_idle, without_superfluous
 from mrpipe.tracing.bench.rivals.other_base_forms import Orders, Unseen, with_best_base
 from mrpipe.tracing.bench.selection.drive_again import with_final_laws
@@ -98,19 +99,19 @@ def trace_campaign(
     options, training, choice = taken.options, taken.training, taken.choice
     validation = validation_recordings(bench, taken, unseen)
     baseline = choice.baseline
-    window, selection, gains, reason = _named_on_training(taken, len(declared), rng, jobs)
+    window, named = _named_on_training(taken, len(declared), rng, jobs)
     progress(0.85, "ceiling")
     offsets = offset_between_tests(
-        selection.chosen,
+        named.selection.chosen,
         effects.get("offset"),
         rules=rules.offsets,
-        least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
+        least_ratio=rules.offsets.clear if named.reason and named.selection.structured else 0.0,
     )
-    case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
-    if not reason:
-        compared = Unseen(options.folds, options.bootstrap_draws, rng)
-        selection, gains, reason = without_beaten_names(selection, gains, len(declared), compared, jobs)
-    selection, assessed = with_likely_names(selection, case, gains, reason, rng)
+    case = Case(choice, training, validation, options, ordered, offsets, jobs)
+    if not named.reason:
+        named = without_beaten_names(named, Unseen(options.folds, options.bootstrap_draws, rng), jobs)
+    named, assessed = with_likely_names(named, case, rng)
+    selection = named.selection
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # an effect that does not lower the error on the validation tests is not named
@@ -127,13 +128,10 @@ def trace_campaign(
 
 def _named_on_training(
     taken: ChosenModel, declared: int, rng: np.random.Generator, jobs: int
-) -> tuple[float, Selection, list[Gain | None], str]:
+) -> tuple[float, NamedEffects]:
     """Return the effects that the training tests require, in the forms and with the laws of the drive that they need.
 
-    Returns
-    -------
-    Window of the filter of the displacement, the selection, the gains of its effects on tests left out, and the reason
-    why no effect is named (empty if effects are named).
+    The window of the filter of the displacement is returned with them.
     """
     options, choice = taken.options, taken.choice
     baseline, selection = choice.baseline, choice.selection
@@ -142,19 +140,19 @@ def _named_on_training(
         window, selection = _with_window(selection, baseline.noise, taken.training, taken.able, options, jobs)
     selection = _needed(selection, choice, declared, options, rng, jobs)
     gains, selection = _cross_validated(selection, declared, options, rng, jobs)
-    reason = unnamed_reason(selection, options)
-    if reason:
-        selection = replace(selection, chosen=selection.without_effects)
+    named = NamedEffects(selection, tuple(gains), declared, unnamed_reason(selection, options))
+    if named.reason:
+        named = replace(named, selection=replace(selection, chosen=selection.without_effects))
     else:
         compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection = _refined(selection, declared, baseline.model_error, options, rng, jobs)
         refinement = options.rules.refinement
         limit = selection.sufficient(refinement.worth_a_try, model_error=baseline.model_error)
         selection = with_inner_springs(selection, limit, refinement.least_gain, compared, jobs)
-        selection, gains, reason = without_idle(selection, gains, declared, lead=_lead(baseline, options))
-    if not reason and selection.proven:
-        selection, gains, reason = without_laws_of_drive(selection, gains, declared, compared, jobs)
-    selection = with_final_laws(selection, options.rules.refinement.least_gain)
+        named = without_idle(replace(named, selection=selection), lead=_lead(baseline, options))
+        if named.selection.proven:
+            named = without_laws_of_drive(named, compared, jobs)
+    selection = with_final_laws(named.selection, options.rules.refinement.least_gain)
     selection = with_further_terms(
         selection,
         folds=options.folds,
@@ -163,7 +161,7 @@ def _named_on_training(
         jobs=jobs,
         rules=options.rules.refinement,
     )
-    return window, selection, gains, reason
+    return window, replace(named, selection=selection)
 
 
 def _nothing_traced(

@@ -19,6 +19,7 @@ from mrpipe.networks.assembly import History, join, samples
 from mrpipe.networks.network import Network
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
+from mrpipe.signals.error_size import nrmse
 from mrpipe.signals.prepared import PreparedTest
 
 SPEEDS = (0.025, 0.075, 0.2, 0.5, 1.0)
@@ -288,9 +289,6 @@ def retrain_inverse(
     )
     trained = train(history, old.features, options, rng, jobs=jobs, progress=progress)
     judged = samples(simulated_history(chain, validation or training, drive_limit, rate, rng), old.features)
-    errors = [
-        float(np.sqrt(np.mean((item.predict(judged.features) - judged.target) ** 2) / np.mean(judged.target**2)))
-        for item in (old, trained.network)
-    ]
+    errors = [nrmse(item.predict(judged.features) - judged.target, judged.target) for item in (old, trained.network)]
     better = trained.network if errors[1] < errors[0] else old
     return Retrained(better, errors[0], errors[1], trained.seconds)

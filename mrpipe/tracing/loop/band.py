@@ -61,7 +61,7 @@ def amplitude_of(run: LoopRun, steady: float = LoopRules().steady) -> float:
     run
         Run that gives the ground motion.
     steady
-        See :class:`~mrpipe.tracing.rules.LoopRules`.
+        Limits of a steady response, see :class:`~mrpipe.tracing.rules.LoopRules`.
     """
     first, last = judged_span(run.time_s, run.ground_acceleration, steady)
     part = run.ground_acceleration[(run.time_s >= first) & (run.time_s <= last)]

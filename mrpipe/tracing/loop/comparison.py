@@ -15,6 +15,7 @@ from mrpipe.campaigns import Campaign
 from mrpipe.control.controller import Controller
 from mrpipe.dampers.plant import Chain
 from mrpipe.errors import DivergedError
+from mrpipe.signals.error_size import nrmse
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.structures import Frame
@@ -231,7 +232,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     if run.recorded:
         top = np.interp(time, response.time_s, displacement[:, -1])
         measured = run.displacement[:, -1] - np.mean(run.displacement[:, -1])
-        found["nrmse_x_top"] = float(np.sqrt(np.mean((top - measured) ** 2) / max(np.mean(measured**2), 1e-30)))
+        found["nrmse_x_top"] = nrmse(top - measured, measured)
     return found
 
 

@@ -76,6 +76,12 @@ class NoiseRules(Section):
         description="Least variance from repeated motion, as a share of what the channels themselves show, because "
         "short repeats may agree by chance.",
     )
+    seed: int = Field(
+        0,
+        ge=0,
+        description="Seed of the noise of the displacement that is simulated. Every model is simulated with the same "
+        "noise, so that chance does not favour one of two models.",
+    )
 
 
 class ModelErrorRules(Section):

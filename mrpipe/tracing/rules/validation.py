@@ -114,6 +114,12 @@ class ValidationRules(Section):
         description="Largest probability of a residual's autocorrelation or dependence on states by chance; it is as "
         "small because samples are many and noise of real sensors is not perfectly white.",
     )
+    seed: int = Field(
+        0,
+        ge=0,
+        description="Seed of the bootstrap that gives the interval of the error of a flexible model. Every test is "
+        "resampled from the same seed, so that chance does not favour one of two models.",
+    )
 
 
 class RemainderRules(Section):

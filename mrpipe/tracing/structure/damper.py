@@ -17,6 +17,7 @@ from mrpipe.campaigns.model import Campaign
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import enough_tests, record_tests
+from mrpipe.signals.error_size import rms
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
@@ -236,4 +237,4 @@ def _nrmse(found: Fit, tests: Sequence[PreparedTest], options: TracingOptions, p
     error = recordings.force - predict(found, recordings)
     sums = np.bincount(recordings.test, weights=error) / np.bincount(recordings.test)
     error = error - sums[recordings.test]
-    return float(np.sqrt(np.mean(error[recordings.used] ** 2))) / recordings.force_rms
+    return rms(error[recordings.used]) / recordings.force_rms

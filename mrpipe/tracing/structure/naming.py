@@ -83,7 +83,7 @@ def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
     item
         The effect.
     amplitudes
-        Its amplitudes, storey after storey.
+        Amplitudes of the effect, storey after storey.
     acting
         Share of the largest amplitude from which on a storey is named.
     """
@@ -106,7 +106,7 @@ def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[s
     item
         The effect.
     amplitudes
-        Its amplitudes, storey after storey.
+        Amplitudes of the effect, storey after storey.
     acting
         Share of the largest amplitude below which a storey does not count in the median.
     """

@@ -72,7 +72,7 @@ def differing_tests(
     scale
         Mean square of the noise of each storey, shape (n,).
     floors
-        The multiple.
+        Multiple of the noise floor, and of the error of the training tests, that the error exceeds.
     """
     own = {item.record.name for item in problem.training}
     least = floors * max(1.0, *(_error_over_noise(model, item, scale) for item in problem.training))

@@ -9,6 +9,8 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.signals.reversals import path_since_reversal
+from mrpipe.tracing.step_function import explained_share
 from mrpipe.tracing.structure.model import FrameModel, in_time
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Score
@@ -19,9 +21,6 @@ LAGS = (0.03, 0.1, 0.3, 0.8)
 MOST_ROWS = 8000
 """Numerical technique: largest number of samples that the flexible model is trained on."""
 
-BINS = 16
-"""Numerical technique: number of steps of the step function of a state."""
-
 
 def frame_score(model: FrameModel, records: Sequence[Spectra]) -> Score:
     """Return the errors of the storey shear forces over all storeys and records, weighted by the sensor noise."""
@@ -29,9 +28,9 @@ def frame_score(model: FrameModel, records: Sequence[Spectra]) -> Score:
     for record in records:
         error = float(np.sum(np.abs((record.target - model.predict(record)) * record.weight) ** 2))
         whole = float(np.sum(np.abs(record.target * record.weight) ** 2))
-        own[record.record.name] = float(np.sqrt(error / max(whole, 1e-300)))
+        own[record.record.name] = _nrmse(error, whole)
         errors, wholes = errors + error, wholes + whole
-    nrmse = float(np.sqrt(errors / max(wholes, 1e-300)))
+    nrmse = _nrmse(errors, wholes)
     return Score(nrmse, 100.0 * (1.0 - nrmse), own)
 
 
@@ -39,7 +38,11 @@ def noise_floor(records: Sequence[Spectra], scale: FloatArray) -> float:
     """Return the NRMSE that sensor noise alone causes; `scale` is the mean square of the noise of each storey."""
     errors = sum(2.0 * float(np.sum(scale)) * item.frequencies_hz.size for item in records)
     wholes = sum(float(np.sum(np.abs(item.target * item.weight) ** 2)) for item in records)
-    return float(np.sqrt(errors / max(wholes, 1e-300)))
+    return _nrmse(errors, wholes)
+
+
+def _nrmse(squared_errors: float, squared_signals: float) -> float:
+    return float(np.sqrt(squared_errors / max(squared_signals, 1e-300)))
 
 
 def residual_in_time(model: FrameModel, record: Spectra) -> FloatArray:
@@ -52,14 +55,11 @@ def states_of(record: Spectra, storey: int) -> dict[str, FloatArray]:
     motion, dt = record.motion, record.record.dt
     drift, rate = motion.drift[storey], motion.drift_rate[storey]
     time = np.arange(len(drift)) * dt
-    turned = np.concatenate([[0], np.flatnonzero(np.diff(np.sign(rate)) != 0) + 1])
-    which = np.searchsorted(turned, np.arange(len(drift)), side="right") - 1
-    path = np.cumsum(np.abs(rate)) * dt
     floor = motion.state_displacement[:, storey]
     return {
         "drift": drift,
         "drift rate": rate,
-        "slip since reversal": (path - path[turned][which]) * np.sign(rate),
+        "slip since reversal": path_since_reversal(rate, dt) * np.sign(rate),
         "floor displacement": floor,
         "floor velocity": motion.state_velocity[:, storey],
         "ground acceleration": motion.ground,
@@ -106,6 +106,7 @@ def flexible_score(
             learning_rate=0.15,
             max_leaf_nodes=24,
             min_samples_leaf=60,
+            # without early stopping, and with so few samples, the trees draw no random number
             random_state=0,
             early_stopping=False,
         )
@@ -119,7 +120,7 @@ def flexible_score(
         left = item.target - model.predict(item) - item.lines_of(force)
         errors += float(np.sum(np.abs(left * item.weight) ** 2))
         wholes += float(np.sum(np.abs(item.target * item.weight) ** 2))
-    return float(np.sqrt(errors / max(wholes, 1e-300)))
+    return _nrmse(errors, wholes)
 
 
 def dependence(model: FrameModel, records: Sequence[Spectra], storey: int) -> list[tuple[str, float]]:
@@ -127,17 +128,9 @@ def dependence(model: FrameModel, records: Sequence[Spectra], storey: int) -> li
     residual = np.concatenate([residual_in_time(model, item)[:, storey] for item in records])
     block = np.concatenate([(np.arange(len(item.taper)) * item.record.dt).astype(int) for item in records])
     parts = [states_of(item, storey) for item in records]
-    sign = np.concatenate([part["drift rate"] > 0.0 for part in parts])
-    found = []
-    for name in parts[0]:
-        values = np.concatenate([part[name] for part in parts])
-        edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
-        place = 2 * np.searchsorted(edges, values) + sign
-        explained = 0.0
-        for half in (0, 1):
-            learn = block % 2 == half
-            count = np.maximum(np.bincount(place[learn], minlength=2 * BINS + 2), 1)
-            mean = np.bincount(place[learn], weights=residual[learn], minlength=2 * BINS + 2) / count
-            explained += float(np.sum(residual[~learn] ** 2) - np.sum((residual[~learn] - mean[place[~learn]]) ** 2))
-        found.append((name, max(0.0, explained / max(float(residual @ residual), 1e-300))))
+    positive = np.concatenate([part["drift rate"] > 0.0 for part in parts])
+    found = [
+        (name, explained_share(residual, np.concatenate([part[name] for part in parts]), positive, block % 2 == 0))
+        for name in parts[0]
+    ]
     return sorted(found, key=lambda item: -item[1])

@@ -104,7 +104,7 @@ def repaired(record: FrameRecord, fault: SensorFault) -> FrameRecord:
     record
         The record; one of another test than that of the fault is returned as it is.
     fault
-        The fault.
+        Fault that is removed from the record.
     """
     if fault.test and record.name != fault.test:
         return record

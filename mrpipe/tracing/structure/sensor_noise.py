@@ -60,7 +60,7 @@ class Noise:
     colour
         Coefficient of the autoregressive process of the accelerometers; 0 if their noise is white.
     rate_hz
-        Sampling rate.
+        Sampling rate [Hz].
     """
 
     acceleration: FloatArray
@@ -101,7 +101,7 @@ def noise_density(
     values
         The channel, shape (m,).
     rate_hz
-        Sampling rate.
+        Sampling rate [Hz].
     above_hz
         Upper edge of the band.
     quietest

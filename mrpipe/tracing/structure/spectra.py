@@ -70,7 +70,7 @@ class Spectra:
     record, motion
         The record, and its motion in the time domain.
     frequencies_hz
-        Of the lines, shape (b,).
+        Frequencies of the lines, shape (b,).
     taper
         Window in the time domain.
     target
@@ -260,7 +260,7 @@ def spectra_of(
     band
         Frequencies in use.
     noise
-        Of the sensors.
+        Noise of the sensors.
     stiffness
         Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
     motion

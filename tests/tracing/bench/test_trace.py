@@ -56,6 +56,18 @@ def test_the_stiffness_of_the_accumulator_comes_out() -> None:
 
 
 @pytest.mark.planted
+@pytest.mark.parametrize("names", [(), ("accumulator",)])
+def test_a_library_without_further_effects_ends_the_search(names: tuple[str, ...]) -> None:
+    library = {name: damper_effects()[name] for name in names}
+    options = TracingOptions(base_forms=("bouc-wen",), refits=2, bootstrap_draws=100, most_effects=2)
+    found = trace_campaign(campaign("accumulator"), library, [], options, rng=np.random.default_rng(1)).summary
+    assert [item["name"] for item in found["effects"]] == list(names)
+    assert found["residual"]["structured"]
+    if not names:
+        assert "no effect of the library" in found["verdict"]
+
+
+@pytest.mark.planted
 def test_a_clean_rig_lacks_nothing() -> None:
     summary = traced("none").summary
     assert summary["effects"] == []

@@ -139,7 +139,7 @@ class Race:
         lead
             A model is clearly worse if its cost exceeds the least one by this share.
         weights
-            See :meth:`costs`.
+            Weight of each training test, see :meth:`costs`.
         """
         costs = self.costs(weights)
         least = float(np.min(costs))

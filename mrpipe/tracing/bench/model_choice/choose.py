@@ -20,6 +20,7 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.base_forms.fits_of_forms import compared_fits_without_effects, on_all_tests
 from mrpipe.tracing.bench.base_forms.promotion import extension_of, winner_on_all_tests, with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race, race
@@ -125,7 +126,7 @@ def choose_model(
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
-        floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+        floor = rms(left) / training.force_rms
         base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
         declared_fit = fit_baseline(
             training, base, declared, model_error_share=floor, rules=options.rules.noise, known=known
@@ -173,7 +174,7 @@ def _raced(
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
-    if not nothing.structured and not _noise_of_motion(baseline):
+    if not nothing.structured and not _noise_of_motion(baseline, options.rules.noise):
         return Choice(baseline, nothing), lambda selection: selection
     progress(0.1, "base forms")
     singles = with_laws_of_leaders(
@@ -226,7 +227,7 @@ def _with_noise_of(
     The residual of the chosen model is an upper bound of the noise.
     """
     scale = noise_scale(chosen, rules)
-    noise = noise_level_of(chosen, scale)
+    noise = noise_level_of(chosen, scale, rules)
     # the residual of a poor model hides hum, so that only hum makes the noise of the better model the larger one
     newly_visible = scale.hum > 0.0 and baseline.scale.hum == 0.0
     if noise >= baseline.noise and not newly_visible:
@@ -237,13 +238,13 @@ def _with_noise_of(
     return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
 
 
-def _noise_of_motion(baseline: Baseline) -> bool:
+def _noise_of_motion(baseline: Baseline, rules: NoiseRules) -> bool:
     """Return whether most of the noise of the force is noise of the displacement times the stiffness of the model.
 
     A stiff base form converts noise of the displacement to a large force. Another form of the same damper may not. Such
     noise therefore does not show that nothing is missing.
     """
-    force, motion = noise_variances(baseline.fit, baseline.fit.problem.recordings)
+    force, motion = noise_variances(baseline.fit, baseline.fit.problem.recordings, rules)
     used = baseline.fit.problem.recordings.used
     return bool(np.sum(baseline.scale.motion * motion[used]) > np.sum(baseline.scale.force * force[used]))
 
@@ -279,7 +280,7 @@ def _weighed_by(baseline: Baseline, found: Fit, scale: NoiseScale, rules: NoiseR
     """Return the baseline with weights and noise from another fit to all training tests."""
     problem = baseline.fit.problem
     root = problem.recordings.used / force_deviation(found, problem.recordings, 0.0, scale, rules)
-    noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale)
+    noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale, rules)
     base = fit(replace(problem, root_weight=root), baseline.fit.theta, iterations=8)
     return replace(baseline, fit=base, noise=noise, scale=scale)
 
@@ -287,7 +288,7 @@ def _weighed_by(baseline: Baseline, found: Fit, scale: NoiseScale, rules: NoiseR
 def _with_scale(baseline: Baseline, choice: Choice, rules: NoiseRules) -> Baseline:
     """Return a baseline with the noise that the best known model shows, if this is less."""
     scale = noise_scale(choice.selection.chosen, rules)
-    noise = noise_level_of(baseline.fit, scale)
+    noise = noise_level_of(baseline.fit, scale, rules)
     return replace(baseline, noise=noise, scale=scale) if noise < baseline.noise else baseline
 
 
@@ -295,7 +296,7 @@ def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
     """Return the baseline weighted by the noise of the chosen model, if that is clearly less; else None."""
     chosen = choice.selection.chosen
     scale = noise_scale(chosen, rules.noise)
-    noise = noise_level_of(chosen, scale)
+    noise = noise_level_of(chosen, scale, rules.noise)
     if min(noise, chosen.chi_square) > rules.model_error.better_form * choice.baseline.noise:
         return None
     return _weighed_by(choice.baseline, chosen, scale, rules.noise)

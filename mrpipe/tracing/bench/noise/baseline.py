@@ -125,7 +125,7 @@ def fit_baseline(
         found = _weighted(found, recordings, model_error_share, rules, scale)
         scale = noise_scale(found, rules)
     deviation = force_deviation(found, recordings, model_error_share, scale, rules)
-    return Baseline(found, noise_level_of(found, scale), deviation, scale)
+    return Baseline(found, noise_level_of(found, scale, rules), deviation, scale)
 
 
 def _weighted(
@@ -146,8 +146,9 @@ def _with_declared(before: Fit, effect: Effect) -> Fit:
     return min(fits, key=lambda item: item.cost * (1.0 + 0.01 * len(item.problem.terms[-1].form.parameters)))
 
 
-def noise_level_of(found: Fit, scale: NoiseScale) -> float:
+def noise_level_of(found: Fit, scale: NoiseScale, rules: NoiseRules | None = None) -> float:
     """Return the mean square of the weighted residual that noise alone causes."""
     root = found.problem.root_weight
     used = root > 0.0
-    return float(np.mean((root[used] * sensor_deviation(found, found.problem.recordings, scale)[used]) ** 2))
+    deviation = sensor_deviation(found, found.problem.recordings, scale, rules)
+    return float(np.mean((root[used] * deviation[used]) ** 2))

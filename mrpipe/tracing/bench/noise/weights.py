@@ -70,7 +70,7 @@ AS_SHOWN = NoiseScale()
 
 
 def noise_variances(
-    found: Fit, recordings: Recordings, *, draws: int = 3, seed: int = 0
+    found: Fit, recordings: Recordings, rules: NoiseRules | None = None, *, draws: int = 3
 ) -> tuple[FloatArray, FloatArray]:
     """Return the variances of the force due to white noise of the force and the displacement channel [N^2], (n,) each.
 
@@ -85,10 +85,12 @@ def noise_variances(
         The fit.
     recordings
         Tests laid end to end.
-    draws, seed
-        Number of simulated noise records, and the seed of their random numbers.
+    rules
+        Rules whose `seed` is that of the simulated noise; their defaults if None.
+    draws
+        Number of simulated noise records.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng((rules or NoiseRules()).seed)
     calm = predict(found, recordings)
     spread = np.zeros(len(calm))
     for _ in range(draws):
@@ -97,9 +99,11 @@ def noise_variances(
     return np.asarray(recordings.force_noise[recordings.test] ** 2), averaged
 
 
-def sensor_deviation(found: Fit, recordings: Recordings, scale: NoiseScale = AS_SHOWN) -> FloatArray:
+def sensor_deviation(
+    found: Fit, recordings: Recordings, scale: NoiseScale = AS_SHOWN, rules: NoiseRules | None = None
+) -> FloatArray:
     """Return the standard deviation of the force that noise explains [N], shape (n,)."""
-    force, motion = noise_variances(found, recordings)
+    force, motion = noise_variances(found, recordings, rules)
     return np.asarray(np.sqrt(scale.force * force + scale.motion * motion), dtype=np.float64)
 
 
@@ -118,7 +122,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     recordings, root = problem.recordings, problem.root_weight
     repeats, cycles = _repeats(recordings, rules), _cycles(recordings, rules)
     residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
-    force, motion = noise_variances(found, recordings)
+    force, motion = noise_variances(found, recordings, rules)
     growing = force * _relative_speed(recordings)
     rows, differences, steps = [], [], []
     for first, second in (*repeats, *cycles):
@@ -179,8 +183,8 @@ def _limit(residual: FloatArray, variance: FloatArray, test: IntArray) -> float:
     of all other tests, and the mean of the limits of the tests takes its place. The mean alone would be too small,
     because noise is above its expected power in some tests and below it in others.
     """
-    together = float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300)
-    return max(min(1.0, together), float(np.mean(noise_limits(residual, variance, test)[test])))
+    overall = float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300)
+    return max(min(1.0, overall), float(np.mean(noise_limits(residual, variance, test)[test])))
 
 
 def noise_limits(residual: FloatArray, variance: FloatArray, test: IntArray, tests: int = 0) -> FloatArray:
@@ -272,8 +276,9 @@ def force_deviation(
     rules
         Decision thresholds; their defaults if None.
     """
-    floor = max((rules or NoiseRules()).least_share, model_error_share) * recordings.force_rms
-    return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)
+    rules = rules or NoiseRules()
+    floor = max(rules.least_share, model_error_share) * recordings.force_rms
+    return np.asarray(np.hypot(sensor_deviation(found, recordings, scale, rules), floor), dtype=np.float64)
 
 
 def repeated_pairs(recordings: Recordings, rules: NoiseRules | None = None) -> list[tuple[int, int]]:

@@ -51,7 +51,7 @@ class Ceiling:
     error: FloatArray
     piece: IntArray
 
-    def nrmse(self, part: BoolArray) -> tuple[float, tuple[float, float]]:
+    def nrmse(self, part: BoolArray, rng: np.random.Generator) -> tuple[float, tuple[float, float]]:
         """Return the NRMSE over some samples, shape (n,), and its 95 % interval by bootstrap over the pieces."""
         part = part & self.recordings.used
         if not part.any():
@@ -59,7 +59,7 @@ class Ceiling:
         index = np.unique(self.piece[part], return_inverse=True)[1]
         squares = np.bincount(index, weights=self.error[part] ** 2)
         powers = np.bincount(index, weights=self.measured[part] ** 2)
-        chosen = np.random.default_rng(0).integers(len(squares), size=(DRAWS, len(squares)))
+        chosen = rng.integers(len(squares), size=(DRAWS, len(squares)))
         draws = squares[chosen].sum(axis=1) / np.maximum(powers[chosen].sum(axis=1), 1e-300)
         low, high = np.sqrt(np.quantile(draws, [0.025, 0.975]))
         return float(np.sqrt(squares.sum() / max(powers.sum(), 1e-300))), (float(low), float(high))
@@ -67,7 +67,7 @@ class Ceiling:
 
 def cross_fitted(
     found: Fit, training: Recordings, residual: FloatArray, validation: Recordings, measured: FloatArray,
-    simulated: FloatArray, *, seed: int = 0, iterations: int = 60,
+    simulated: FloatArray, *, iterations: int = 60,
 ) -> Ceiling:  # fmt: skip
     """Return the residual of a flexible model on pieces of the validation records that were left out of its training.
 
@@ -85,8 +85,6 @@ def cross_fitted(
         Measured minus simulated force of the training tests [N], shape (n,); 0 at samples that are not compared.
     validation, measured, simulated
         Validation tests, their offset-free force and the simulated one [N], shape (m,).
-    seed
-        Seed of the random numbers of the trees.
     iterations
         Number of trees.
     """
@@ -104,7 +102,7 @@ def cross_fitted(
         judged = np.flatnonzero(validation.used & out)
         if not len(rows) or not len(judged):
             continue
-        trees = _trees(seed, iterations)
+        trees = _trees(iterations)
         with threadpool_limits(1):
             trees.fit(
                 np.concatenate([states[rows], known[rows_known]]), np.concatenate([rest[rows], residual[rows_known]])
@@ -165,7 +163,6 @@ def flexible_residual(
     residual: FloatArray,
     validation: Recordings,
     *,
-    seed: int = 0,
     iterations: int = 100,
 ) -> FloatArray:
     """Return the prediction on validation tests of a flexible model that is fitted to the training residual [N].
@@ -180,8 +177,6 @@ def flexible_residual(
         Residual force of the training tests [N], shape (n,); 0 at samples that are not compared.
     validation
         Validation tests.
-    seed
-        Seed of the random numbers of the trees.
     iterations
         Number of trees.
 
@@ -190,7 +185,7 @@ def flexible_residual(
     Shape (m,) [N].
     """
     rows = _rows(training.used)
-    trees = _trees(seed, iterations)
+    trees = _trees(iterations)
     with threadpool_limits(1):
         trees.fit(lagged_states(found, training)[rows], residual[rows])
     return np.asarray(trees.predict(lagged_states(found, validation)), dtype=np.float64)
@@ -201,19 +196,20 @@ def _rows(used: BoolArray) -> IntArray:
     return np.asarray(rows[:: max(1, -(-len(rows) // MOST_ROWS))], dtype=np.int64)
 
 
-def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
+def _trees(iterations: int) -> HistGradientBoostingRegressor:
+    """Return untrained trees; with at most `2 MOST_ROWS` samples and no early stopping they draw no random number."""
     return HistGradientBoostingRegressor(
         max_iter=iterations,
         learning_rate=0.08,
         max_leaf_nodes=24,
         min_samples_leaf=60,
         l2_regularization=1.0,
-        random_state=seed,
+        random_state=0,
         early_stopping=False,
     )
 
 
-def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 80) -> float:
+def flexible_chi_square(found: Fit, *, folds: int = 3, iterations: int = 80) -> float:
     """Return the mean square of the weighted residual [1] that a flexible model leaves on tests left out of its fit."""
     problem = found.problem
     used = problem.root_weight > 0.0
@@ -226,7 +222,7 @@ def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations
         if not len(rows) or not len(judged):
             total += float(np.sum(target[judged] ** 2))
             continue
-        trees = _trees(seed, iterations)
+        trees = _trees(iterations)
         with threadpool_limits(1):
             trees.fit(features[rows], target[rows])
         total += float(np.sum((target[judged] - trees.predict(features[judged])) ** 2))

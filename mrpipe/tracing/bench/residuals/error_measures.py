@@ -8,6 +8,7 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.verdict import Score
 
 
@@ -95,15 +96,15 @@ def score(recordings: Recordings, measured: FloatArray, simulated: FloatArray) -
     for index, name in enumerate(recordings.names):
         own = used & (recordings.test == index)
         if own.any():
-            by_test[name] = rms(error[own]) / max(rms(measured[own]), 1e-12)
+            by_test[name] = relative_rms(error[own], measured[own])
     spread = measured[used] - np.mean(measured[used])
     return Score(
-        nrmse=rms(error[used]) / max(rms(measured[used]), 1e-12),
+        nrmse=relative_rms(error[used], measured[used]),
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(error[used])) / max(float(np.linalg.norm(spread)), 1e-12)),
         by_test=by_test,
     )
 
 
-def rms(values: FloatArray) -> float:
-    """Return the root mean square of values, shape (n,), in their unit; 0 without values."""
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0
+def relative_rms(error: FloatArray, measured: FloatArray) -> float:
+    """Return the root mean square of an error over that of the measured signal; 0 without samples."""
+    return rms(error) / max(rms(measured), 1e-12)

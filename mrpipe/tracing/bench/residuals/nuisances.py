@@ -14,6 +14,7 @@ from scipy import stats
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.residuals.residual_structure import BLOCK
 from mrpipe.tracing.rules import NuisanceRules, ValidationRules
 
@@ -168,9 +169,9 @@ def session_gain(
         half = float(stats.t.ppf(0.975, len(values) - 1) * deviation / np.sqrt(len(values)))
         rest = recordings.used & ~first
         weaker = np.isin(recordings.test, [k for k, name in enumerate(recordings.names) if name in chosen])
-        power = float(np.sqrt(np.mean(measured[rest] ** 2)))
+        power = rms(measured[rest])
         without, with_it = (
-            float(np.sqrt(np.mean((measured - simulated * factor)[rest] ** 2))) / power
+            rms((measured - simulated * factor)[rest]) / power
             for factor in (np.ones(len(measured)), np.where(weaker, value, 1.0))
         )
         interval = (value - half, value + half)

@@ -12,13 +12,12 @@ from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.solution import chain_of
+from mrpipe.signals.reversals import last_reversal, path_since_reversal
 from mrpipe.tracing.rules import LocationRules
+from mrpipe.tracing.step_function import explained_share
 
 BLOCK = 0.6
 """Numerical technique: length of the blocks whose sums are taken as independent, in periods of the motion."""
-
-BINS = 16
-"""Numerical technique: number of steps of the step function of a state."""
 
 LAGS_FIT = 4
 """Numerical technique: autocorrelations are tested on records with at least this number of samples per lag."""
@@ -76,13 +75,9 @@ def memory_of(recordings: Recordings) -> tuple[FloatArray, FloatArray, FloatArra
     for test in range(recordings.tests):
         piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
         v, dt = recordings.velocity[piece], recordings.dt[test]
-        path = np.cumsum(np.abs(v)) * dt
         time = np.arange(len(v)) * dt
-        turned = np.flatnonzero(np.diff(np.sign(v)) != 0) + 1
-        marks = np.concatenate([[0], turned])
-        which = np.searchsorted(marks, np.arange(len(v)), side="right") - 1
-        slip[piece] = path - path[marks][which]
-        since[piece] = time - time[marks][which]
+        slip[piece] = path_since_reversal(v, dt)
+        since[piece] = time - time[last_reversal(np.sign(v))]
         past[piece] = np.maximum.accumulate(np.abs(recordings.drive[piece]))
         rate[piece] = np.gradient(recordings.drive[piece]) / dt
     return slip, since, past, rate
@@ -156,20 +151,11 @@ def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
     r = residual[used]
     half = (np.unique(states.block[used], return_inverse=True)[1] % 2).astype(np.bool_)
     positive = states.values["velocity"][used] > 0.0
-    found = []
-    for name, values in states.values.items():
-        feature = values[used]
-        edges = np.unique(np.quantile(feature, np.linspace(0, 1, BINS + 1)[1:-1]))
-        bins = np.searchsorted(edges, feature) * 2 + (0 if name == "direction" else positive)
-        explained = 0.0
-        for train in (half, ~half):
-            size = int(bins.max()) + 1
-            counts = np.bincount(bins[train], minlength=size)
-            sums = np.bincount(bins[train], weights=r[train], minlength=size)
-            mean = sums / np.maximum(counts, 1)
-            test = ~train
-            explained += float(np.sum(r[test] ** 2) - np.sum((r[test] - mean[bins[test]]) ** 2))
-        found.append((name, max(0.0, explained / max(float(r @ r), 1e-300))))
+    both = np.zeros_like(positive)
+    found = [
+        (name, explained_share(r, values[used], both if name == "direction" else positive, half))
+        for name, values in states.values.items()
+    ]
     return sorted(found, key=lambda item: -item[1])
 
 

@@ -8,63 +8,48 @@ effect counts as proven only if it predicts tests left out better than a saturat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from mrpipe.fitting.drive_laws import YIELD_LAWS
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.tracing.bench.rivals.needed import without_one
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.other_base_forms import ITERATIONS, Unseen
-from mrpipe.tracing.bench.selection.select import Selection
-from mrpipe.tracing.gain import Gain
 
 LAWS = tuple(law for law in YIELD_LAWS if law.saturates)
 """Numerical technique: laws of the yield force that saturate, each with two coefficients and a scale."""
 
 
-def without_laws_of_drive(
-    selection: Selection, gains: Sequence[Gain | None], declared: int, unseen: Unseen, jobs: int = 1
-) -> tuple[Selection, list[Gain | None], str]:
-    """Return the selection, its gains, and why an effect is not named if a law of the drive predicts as well.
+def without_laws_of_drive(named: NamedEffects, unseen: Unseen, jobs: int = 1) -> NamedEffects:
+    """Return the named effects without one that a law of the drive replaces, and why none remains.
 
-    The law then replaces the effect. The reason is empty if effects remain, or if no effect was replaced.
+    The law replaces an effect that limits the drive if it predicts tests left out as well. The reason is empty if
+    effects remain, or if no effect was replaced.
 
     Parameters
     ----------
-    selection
-        Named effects with their fit, without further terms.
-    gains
-        Gains of the named effects on tests that were left out.
-    declared
-        Number of terms that the campaign declares; they are part of every model.
+    named
+        Named effects, without further terms.
     unseen
         Comparison on tests that were left out.
     jobs
         Threads.
     """
-    kept = list(gains)
-    chosen = selection.chosen
-    last = min(declared + selection.proven, len(chosen.problem.terms))
-    places = [place for place in range(declared, last) if chosen.problem.terms[place].effect.law_of_drive]
-    if not places:
-        return selection, kept, ""
-    place = places[0]
+    chosen = named.selection.chosen
+    place = next((place for place in named.places if chosen.problem.terms[place].effect.law_of_drive), None)
+    if place is None:
+        return named
     rival = best_law(chosen, place)
     if unseen.better(rival, chosen, jobs):
-        return selection, kept, ""
-    name = chosen.problem.terms[place].effect.name
-    found, kept = without_one(selection, kept, place, declared, rival)
-    if found.proven:
-        return found, kept, ""
-    return (
-        found,
-        kept,
-        (
-            f"no effect is named: {name} lowers the error, but a yield force that levels off with the drive "
-            f"({rival.problem.base.laws[0].kind} law) predicts tests that were left out as well"
-        ),
+        return named
+    found = named.without_one(place, rival)
+    if found.selection.proven:
+        return found
+    reason = (
+        f"no effect is named: {chosen.problem.terms[place].effect.name} lowers the error, but a yield force that "
+        f"levels off with the drive ({rival.problem.base.laws[0].kind} law) predicts tests that were left out as well"
     )
+    return replace(found, reason=reason)
 
 
 def best_law(found: Fit, place: int) -> Fit:

@@ -9,7 +9,6 @@ effects predict tests left out better than this force does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,10 +20,9 @@ from mrpipe.dampers.plant import CURRENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY
 from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.rivals.needed import without_names
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.other_base_forms import HOPELESS, ITERATIONS, Unseen
-from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
-from mrpipe.tracing.gain import Gain
+from mrpipe.tracing.bench.selection.select import fit_on_draft_tests
 from mrpipe.words import listed
 
 RELAXATION_TIMES = tuple(float(item) for item in np.geomspace(0.02, 12.0, 5))
@@ -78,45 +76,38 @@ def linear_memory(scales: Scales) -> Effect:
     )
 
 
-def without_beaten_names(
-    selection: Selection, gains: Sequence[Gain | None], declared: int, unseen: Unseen, jobs: int = 1
-) -> tuple[Selection, list[Gain | None], str]:
-    """Return the selection, its gains, and why its effects are not named if the linear memory predicts as well.
+def without_beaten_names(named: NamedEffects, unseen: Unseen, jobs: int = 1) -> NamedEffects:
+    """Return the named effects; without names, and the reason, if the linear memory predicts as well as they do.
 
     Effects that are not named become further terms, whose cause is not proven. The reason is empty if the names hold.
 
     Parameters
     ----------
-    selection
-        Named effects with their fit, and further terms.
-    gains
-        Gains of the named effects on tests that were left out.
-    declared
-        Number of terms that the campaign declares; they are part of every model.
+    named
+        Named effects, and further terms.
     unseen
         Comparison on tests that were left out.
     jobs
         Threads.
     """
-    named = selection.with_named_alone.chosen
-    kept = list(gains)
-    if not selection.proven or named.chi_square <= selection.noise:
-        return selection, kept, ""
-    small = fit_on_draft_tests(named)
+    selection, declared = named.selection, named.declared
+    alone = selection.with_named_alone.chosen
+    if not named.places or alone.chi_square <= selection.noise:
+        return named
+    small = fit_on_draft_tests(alone)
     rival = with_linear_memory(small, declared)
     if rival.chi_square > HOPELESS * small.chi_square:
-        return selection, kept, ""
-    rival = with_linear_memory(named, declared, rival)
-    if rival.chi_square > HOPELESS * named.chi_square or unseen.better(rival, named, jobs):
-        return selection, kept, ""
-    effects = [term.effect.name for term in named.problem.terms[declared:]]
+        return named
+    rival = with_linear_memory(alone, declared, rival)
+    if rival.chi_square > HOPELESS * alone.chi_square or unseen.better(rival, alone, jobs):
+        return named
+    effects = [term.effect.name for term in alone.problem.terms[declared:]]
     verb = "lowers" if len(effects) == 1 else "lower"
     reason = (
         f"no effect is named: {listed(effects)} {verb} the error, but a linear memory of the motion, which has "
         "no name in the library, predicts tests that were left out as well or better"
     )
-    shorter, kept = without_names(selection, gains, range(selection.proven), declared)
-    return shorter, kept, reason
+    return replace(named.without_names(range(len(named.places))), reason=reason)
 
 
 def with_linear_memory(found: Fit, declared: int, start: Fit | None = None) -> Fit:

@@ -7,22 +7,23 @@ richer laws and the best rival base forms are tried without it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
 from mrpipe.tracing.bench.base_forms.promotion import with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race
+from mrpipe.tracing.bench.rivals.named_effects import (
+    NamedEffects,
+    named_places,
+    other_places,
+    with_terms_in_order,
+)
 from mrpipe.tracing.bench.rivals.other_base_forms import Orders, best_rival, with_rival_base_form
 from mrpipe.tracing.bench.selection.refine import with_best_forms
 from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
-from mrpipe.tracing.gain import Gain
-
-ITERATIONS = 15
-"""Numerical technique: largest number of steps of a fit without one of the effects."""
 
 
 def without_superfluous(
@@ -68,10 +69,8 @@ def without_superfluous(
     return kept
 
 
-def without_idle(
-    selection: Selection, gains: Sequence[Gain | None], declared: int, *, lead: float
-) -> tuple[Selection, list[Gain | None], str]:
-    """Return the selection, its gains, and why no effect is named if the model fits as well without its effects.
+def without_idle(named: NamedEffects, *, lead: float) -> NamedEffects:
+    """Return the named effects without those that the model fits as well without, and why none remains.
 
     A fit with an effect may end in a better minimum of the other parameters than any fit without the effect has found.
     Then these parameters lower the error, and not the effect. Each effect is therefore left out once, and the other
@@ -79,63 +78,30 @@ def without_idle(
 
     Parameters
     ----------
-    selection
-        Named effects with their fit, without further terms.
-    gains
-        Gains of the named effects on tests that were left out.
-    declared
-        Number of terms that the campaign declares; they are part of every model.
+    named
+        Named effects, without further terms.
     lead
         An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
     """
-    kept, left = selection, list(gains)
-    while kept.proven > 0 and len(named := _named(kept, declared)) > 0:
+    while named.selection.proven > 0 and named.places:
+        chosen = named.selection.chosen
         fits = [
-            (with_own_laws(with_terms_in_order(kept.chosen, _others(kept.chosen, place))), place) for place in named
+            (with_own_laws(with_terms_in_order(chosen, other_places(chosen, place))), place) for place in named.places
         ]
         best, place = min(fits, key=lambda item: item[0].chi_square)
-        if best.chi_square > lead * kept.chosen.chi_square:
+        if best.chi_square > lead * chosen.chi_square:
             break
-        name = kept.chosen.problem.terms[place].effect.name
-        kept, left = without_one(kept, left, place, declared, best)
-        if not kept.proven:
-            return kept, left, f"no effect is named: the base form fits as well without {name}"
-    return kept, left, ""
-
-
-def without_one(
-    selection: Selection, gains: Sequence[Gain | None], place: int, declared: int, chosen: Fit
-) -> tuple[Selection, list[Gain | None]]:
-    """Return the selection and its gains without one of its named effects.
-
-    Parameters
-    ----------
-    selection, gains
-        Named effects with their fit, without further terms, and their gains on tests that were left out.
-    place
-        Which term of the model is dropped.
-    declared
-        Number of terms that the campaign declares.
-    chosen
-        The fit without this term.
-    """
-    number = place - declared
-    proven = len(_named(selection, declared)) - 1
-    rest = tuple(item for k, item in enumerate(selection.rounds) if k != number)
-    found = replace(
-        selection,
-        chosen=chosen,
-        ground=selection.ground if proven else chosen,
-        proven=proven,
-        rounds=rest or selection.rounds[:1],
-    )
-    return found, [gain for k, gain in enumerate(gains) if k != number]
+        named = named.without_one(place, best)
+        if not named.selection.proven:
+            name = chosen.problem.terms[place].effect.name
+            return replace(named, reason=f"no effect is named: the base form fits as well without {name}")
+    return replace(named, reason="")
 
 
 def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:
     """Return the selection without one of its named effects, under the same base form; None if each is needed."""
     small = fit_on_draft_tests(kept.chosen)
-    named = _named(kept, declared)
+    named = named_places(kept, declared)
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         without = pool.map(lambda k: _without(small, k, named, orders), named)
         place, best = min(zip(named, without, strict=True), key=lambda item: item[1].chi_square)
@@ -155,7 +121,7 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
         proven=kept.proven - 1,
         # a round that compares the remaining effects with their rivals; the first round even if its winner was dropped
         rounds=kept.rounds[: place - declared] or kept.rounds[:1],
-        extension=with_terms_in_order(full, [*_others(full, place), place]),
+        extension=with_terms_in_order(full, [*other_places(full, place), place]),
     )
 
 
@@ -171,8 +137,8 @@ def _with_rival(
     """Return the selection without one of its named effects, under another base form; None if each is needed."""
     if race is None:
         return None
-    small, named = fit_on_draft_tests(kept.chosen), _named(kept, declared)
-    sets = [_others(small, place) for place in named]
+    small, named = fit_on_draft_tests(kept.chosen), named_places(kept, declared)
+    sets = [other_places(small, place) for place in named]
     limit = (1.0 + worth_a_try) * kept.noise
     # the best forms only lower the error, and they take long
     full = with_best_forms(small, named, jobs=jobs) if small.chi_square > limit else None
@@ -187,53 +153,7 @@ def _with_rival(
     return with_candidates(again, race) if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
 
 
-def _named(kept: Selection, declared: int) -> range:
-    return range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
-
-
-def _others(found: Fit, place: int) -> list[int]:
-    return [k for k in range(len(found.problem.terms)) if k != place]
-
-
 def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
     """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
-    start = orders.adequate(with_terms_in_order(found, _others(found, place)))
+    start = orders.adequate(with_terms_in_order(found, other_places(found, place)))
     return with_best_forms(start, range(named.start, named.stop - 1))
-
-
-def with_terms_in_order(found: Fit, places: Sequence[int]) -> Fit:
-    """Return a fit with these terms in this order, from the values of another fit."""
-    problem = replace(found.problem, terms=tuple(found.problem.terms[k] for k in places))
-    values = [found.term_values[k] for k in places]
-    return fit(problem, start_of(problem, found.base_values, values), iterations=ITERATIONS)
-
-
-def without_names(
-    selection: Selection, gains: Sequence[Gain | None], places: Sequence[int], declared: int
-) -> tuple[Selection, list[Gain | None]]:
-    """Return the selection with some of its named terms as further terms, and the gains of the others.
-
-    Parameters
-    ----------
-    selection
-        Named effects with their fit, and further terms.
-    gains
-        Gains of the named effects on tests that were left out.
-    places
-        Indices, among the named effects, of those that become further terms.
-    declared
-        Number of terms that the campaign declares.
-    """
-    alone = selection.with_named_alone.chosen
-    count = len(alone.problem.terms) - declared
-    kept = [k for k in range(count) if k not in places]
-    behind = range(declared + count, len(selection.chosen.problem.terms))
-    order = [*range(declared), *(declared + k for k in kept), *(declared + k for k in places), *behind]
-    named = selection.without_effects if not kept else with_terms_in_order(alone, order[: declared + len(kept)])
-    return replace(
-        selection,
-        chosen=with_terms_in_order(selection.chosen, order),
-        named_fit=named,
-        proven=len(kept),
-        rounds=tuple(selection.rounds[k] for k in kept if k < len(selection.rounds)) or selection.rounds[:1],
-    ), [gains[k] if k < len(gains) else None for k in kept]

@@ -194,9 +194,8 @@ def candidates_after(
     """
     rules = rules or SelectionRules()
     penalised = partial(_penalised, share=rules.per_parameter)
-    present = {term.effect.name for term in before.problem.terms}
     small = fit_on_draft_tests(before)
-    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    ranked = screen(small, _not_present(terms, before), jobs=jobs)
     families: dict[str, list[Screened]] = {}
     for item in ranked:
         families.setdefault(item.term.effect.name, []).append(item)
@@ -252,10 +251,15 @@ def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> li
         return list(pool.map(work, items))
 
 
+def _not_present(terms: Sequence[Term], found: Fit) -> list[Term]:
+    """Return the terms whose effect is not yet part of a fit."""
+    present = {term.effect.name for term in found.problem.terms}
+    return [term for term in terms if term.effect.name not in present]
+
+
 def _nothing_more(before: Fit, terms: Sequence[Term], least: float, jobs: int) -> bool:
-    present = {term.effect.name for term in before.problem.terms}
     small = fit_on_draft_tests(before)
-    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    ranked = screen(small, _not_present(terms, before), jobs=jobs)
     return ranked[0].gain * small.chi_square < least
 
 
@@ -310,7 +314,7 @@ def forward_selection(
         return Selection(base, noise, (), base, nothing_missing=rules.nothing_missing)
     # of a large excess even a small share is clearly more than noise
     enough = min(rules.gain * excess, (rules.clear_floors**2 - 1.0) * noise)
-    while len(rounds) < most:
+    while len(rounds) < most and _not_present(terms, chosen):
         little = chosen.chi_square - noise < min(rules.further * excess, (rules.near_floors**2 - 1.0) * noise)
         if rounds and little and _nothing_more(chosen, terms, enough, jobs):
             break

@@ -11,8 +11,8 @@ from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.residuals.crossvalidation import left_out_residual
-from mrpipe.tracing.bench.residuals.error_measures import rms
 from mrpipe.tracing.bench.residuals.nuisances import SessionGain
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
@@ -147,7 +147,7 @@ class Comparison:
     Attributes
     ----------
     differences
-        How validation tests differ.
+        Differences between the validation tests and the training tests.
     comparable
         Samples within the range of the training tests, of tests without a difference of gain, lag or offset, shape
         (n,).

@@ -11,10 +11,17 @@ from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.noise.baseline import Baseline
 from mrpipe.tracing.bench.noise.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.bench.residuals.ceiling import Ceiling, cross_fitted
-from mrpipe.tracing.bench.residuals.error_measures import JudgedPart, campaign_offset, judged_part, rms, score
+from mrpipe.tracing.bench.residuals.error_measures import (
+    JudgedPart,
+    campaign_offset,
+    judged_part,
+    relative_rms,
+    score,
+)
 from mrpipe.tracing.bench.residuals.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residuals.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation.differences import (
@@ -25,7 +32,7 @@ from mrpipe.tracing.bench.validation.differences import (
     with_session,
 )
 from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, unexplained_tests
-from mrpipe.tracing.rules import ValidationRules
+from mrpipe.tracing.rules import NoiseRules, ValidationRules
 from mrpipe.tracing.verdict import Comparable, Score, Verdict
 from mrpipe.words import listed
 
@@ -82,12 +89,12 @@ class OnValidation:
     def nrmse(self, simulated: FloatArray, part: BoolArray | None = None) -> float:
         """Return the NRMSE over a part of the samples that are compared."""
         used = self.recordings.used if part is None else part & self.recordings.used
-        return rms((self.measured - simulated)[used]) / max(rms(self.measured[used]), 1e-12)
+        return relative_rms((self.measured - simulated)[used], self.measured[used])
 
     def floor_nrmse(self, part: BoolArray | None = None) -> float:
         """Return the NRMSE that noise alone causes."""
         used = self.recordings.used if part is None else part & self.recordings.used
-        return rms(self.floor[used]) / max(rms(self.measured[used]), 1e-12)
+        return relative_rms(self.floor[used], self.measured[used])
 
     def unexplained(self, rules: ValidationRules) -> tuple[bool, float, float]:
         """Return whether more than noise remains, its share of the residual before, and the whiteness p-value."""
@@ -106,6 +113,7 @@ def on_validation(
     validation: Recordings,
     rules: ValidationRules,
     *,
+    noise_rules: NoiseRules | None = None,
     own_offsets: bool = False,
     record_gain: bool = False,
 ) -> OnValidation:
@@ -125,6 +133,8 @@ def on_validation(
         Validation tests.
     rules
         Decision thresholds.
+    noise_rules
+        How the noise was estimated; the defaults if None.
     own_offsets
         Whether the offsets of the tests are a finding; the base model is then judged with one offset for all tests.
     record_gain
@@ -147,7 +157,7 @@ def on_validation(
         recordings = replace(recordings, used=recordings.used & ~first)
     if own_offsets:
         before = before - (judged.offsets - np.median(judged.offsets))[validation.test]
-    force, motion = noise_variances(chosen, validation)
+    force, motion = noise_variances(chosen, validation, noise_rules)
     scale = baseline.scale
     # the noise of a displacement, passed through a damper whose force depends on velocity or acceleration, is known
     # only up to a factor; it cannot exceed the residual of the final model
@@ -239,9 +249,9 @@ def judge(
         Processes; the result does not depend on their number.
     """
     ceilings = ceilings_of(found, base, chosen, training)
-    whole = _evidence(found, ceilings, found.recordings.used, structured, bool(names), bool(base_taken))
+    whole = _evidence(found, ceilings, found.recordings.used, rules, structured, bool(names), bool(base_taken))
     kind = classify(whole, rules)
-    total = min((item.nrmse(found.recordings.used) for item in ceilings), key=lambda item: item[0])
+    total = _lowest(ceilings, found.recordings.used, rules)
     if kind in ("noise", "explained"):
         return VerdictWithEvidence(
             Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share), whole, *total, None
@@ -256,7 +266,7 @@ def judge(
     evidence, inner = whole, ""
     tests: tuple[str, ...] = ()
     if np.count_nonzero(part) > 0:
-        evidence = _evidence(found, ceilings, part, structured, bool(names), bool(base_taken))
+        evidence = _evidence(found, ceilings, part, rules, structured, bool(names), bool(base_taken))
         tests = tuple(item.name for item in evidence.conditions)
         inner = _sentence(classify(evidence, rules), evidence, names, base_taken, reason, rules)
     comparable = Comparable(
@@ -290,15 +300,30 @@ def ceilings_of(found: OnValidation, base: Fit, chosen: Fit, training: Recording
     return result
 
 
+def _lowest(ceilings: Sequence[Ceiling], part: BoolArray, rules: ValidationRules) -> tuple[float, tuple[float, float]]:
+    """Return the lowest NRMSE of the flexible models on some samples, and its 95 % interval.
+
+    The bootstrap of every model and of every part begins at the same seed, so that chance does not favour one of them.
+    """
+    errors = (item.nrmse(part, np.random.default_rng(rules.seed)) for item in ceilings)
+    return min(errors, key=lambda item: item[0])
+
+
 def _evidence(
-    found: OnValidation, ceilings: Sequence[Ceiling], part: BoolArray, structured: bool, effects: bool, changed: bool
+    found: OnValidation,
+    ceilings: Sequence[Ceiling],
+    part: BoolArray,
+    rules: ValidationRules,
+    structured: bool,
+    effects: bool,
+    changed: bool,
 ) -> Evidence:
     conditions = []
     for test, name in enumerate(found.recordings.names):
         own = part & (found.recordings.test == test)
         if not (own & found.recordings.used).any():
             continue
-        ceiling, (_, upper) = min((item.nrmse(own) for item in ceilings), key=lambda item: item[0])
+        ceiling, (_, upper) = _lowest(ceilings, own, rules)
         conditions.append(
             Condition(
                 name, found.nrmse(found.before, own), found.nrmse(found.after, own), found.floor_nrmse(own), ceiling,
@@ -310,7 +335,7 @@ def _evidence(
         found.nrmse(found.before, part),
         found.nrmse(found.after, part),
         found.floor_nrmse(part),
-        min(item.nrmse(part)[0] for item in ceilings),
+        _lowest(ceilings, part, rules)[0],
         tuple(conditions),
         structured,
         effects,

@@ -14,7 +14,7 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests
 from mrpipe.tracing.bench.model_choice.choose import Choice
 from mrpipe.tracing.bench.residuals.crossvalidation import intervals
-from mrpipe.tracing.bench.rivals.needed import without_names
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.selection.select import Selection, share_of
 from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence
 from mrpipe.tracing.bench.verdict.gates import (
@@ -44,8 +44,6 @@ class Case:
         Options of the tracing.
     ordered
         The tests that are used, and the faults that were found in tests.
-    declared
-        Number of terms that the campaign declares. They come first and are part of the baseline.
     offsets
         Offset that differs between tests; None if there is none.
     jobs
@@ -57,7 +55,6 @@ class Case:
     validation: Recordings
     options: TracingOptions
     ordered: SortedTests
-    declared: int
     offsets: OffsetFinding | None
     jobs: int
 
@@ -71,7 +68,7 @@ class Assessment:
     named
         The named terms of the model with their evidence, in their order.
     causes
-        What the verdict names, with probabilities: the named terms, and an offset between tests.
+        The causes that the verdict names, with probabilities: the named terms, and an offset between tests.
     further
         Terms of the model whose cause is not proven.
     missing
@@ -97,61 +94,58 @@ class Assessment:
 
 
 def assess(
-    selection: Selection,
+    found: NamedEffects,
     case: Case,
-    gains: Sequence[Gain | None],
-    reason: str,
     rng: np.random.Generator,
     *,
-    several: bool = False,
+    with_others: bool = False,
     doubts: Sequence[Named] = (),
 ) -> Assessment:
-    """Return names, further terms and the verdict of a selection.
+    """Return the probability of each named effect and further term, the errors on validation, and the verdict.
 
     Parameters
     ----------
-    selection
-        Named effects with their fit, and further terms.
+    found
+        Named effects, and further terms.
     case
         Data that do not change.
-    gains
-        Gains of the named effects on tests that were left out.
-    reason
-        Why nothing is named; empty if something is.
     rng
         Source of randomness.
-    several
-        Whether several effects were named together before some of them became further terms; the remaining ones keep
-        the lower probability of several effects.
+    with_others
+        Whether more than one effect had a name before some of them became further terms. The remaining ones then keep
+        the lower probability of an effect that is not alone.
     doubts
         Terms that lost their name, with the probability that they had as names. They keep it as further terms.
     """
     options, baseline, offsets = case.options, case.choice.baseline, case.offsets
+    selection = found.selection
     proven = selection.with_named_alone
-    named = _named(proven, case, gains, case.declared, rng)
-    further = _named(selection, case, (), case.declared + len(named), rng)
+    named = _with_evidence(proven, case, found.gains, found.declared, rng)
+    further = _with_evidence(selection, case, (), found.declared + len(named), rng)
     causes = [*named, *([offsets.as_named_effect()] if offsets is not None else [])]
     if offsets is not None and any(item.effect.name == "offset" for item in named):
         causes.pop()
     missing = residual_is_structured(selection, baseline, case.training, options, bool(causes))
     differ = offsets is not None
-    found = errors_on_validation(
+    errors = errors_on_validation(
         selection.base, selection.chosen, baseline, case.training, case.validation, options, differ
     )
     # the class of the verdict is that of the named effects; further terms do not explain anything
-    alone = found
+    alone = errors
     if proven is not selection:
         alone = errors_on_validation(
             selection.base, proven.chosen, baseline, case.training, case.validation, options, differ
         )
     judgement = verdict_on_validation(
-        alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs
+        alone, proven, case.training, options, causes, missing, found.reason, case.ordered, case.jobs
     )
-    several = several or len(named) > 1
+    with_others = with_others or len(named) > 1
     evidence = judgement.evidence
     beyond = evidence.structured and evidence.after > options.rules.validation.noise_floors * evidence.floor
     likely = tuple(
-        with_calibrated_probability(item, judgement, options, several=several, beyond=beyond, chosen=item in named)
+        with_calibrated_probability(
+            item, judgement, options, with_others=with_others, beyond=beyond, chosen=item in named
+        )
         for item in causes
     )
     known = {item.effect.name: item for item in doubts}
@@ -159,16 +153,14 @@ def assess(
     unproven = tuple(
         replace(item, confidence=known[item.effect.name].confidence)
         if item.effect.name in known
-        else with_calibrated_probability(item, judgement, options, several=True, beyond=True)
+        else with_calibrated_probability(item, judgement, options, with_others=True, beyond=True)
         for item in further
     )
-    return Assessment(named, likely, unproven, missing, found, alone, judgement)
+    return Assessment(named, likely, unproven, missing, errors, alone, judgement)
 
 
-def with_likely_names(
-    selection: Selection, case: Case, gains: Sequence[Gain | None], reason: str, rng: np.random.Generator
-) -> tuple[Selection, Assessment]:
-    """Return the selection with the names that are more likely present than absent, and its assessment.
+def with_likely_names(found: NamedEffects, case: Case, rng: np.random.Generator) -> tuple[NamedEffects, Assessment]:
+    """Return the effects whose names are more likely present than absent, and their assessment.
 
     An effect whose probability is too low loses its name and becomes a further term. This changes the probabilities of
     the other names, so that they are assessed again until every probability is high enough. Further terms that do not
@@ -176,34 +168,30 @@ def with_likely_names(
 
     Parameters
     ----------
-    selection
-        Named effects with their fit, and further terms.
+    found
+        Named effects, and further terms.
     case
         Data that do not change.
-    gains
-        Gains of the named effects on tests that were left out.
-    reason
-        Why nothing is named; empty if something is.
     rng
         Source of randomness.
     """
-    assessed = assess(selection, case, gains, reason, rng)
-    several = len(assessed.named) > 1
+    assessed = assess(found, case, rng)
+    with_others = len(assessed.named) > 1
     doubts: list[Named] = []
-    while (places := _unlikely(assessed, case.options)) or assessed.further_terms_fail:
-        if places:
-            doubts += [assessed.causes[k] for k in places]
-            selection, gains = without_names(selection, gains, places, case.declared)
-            reason = "" if selection.proven else _unlikely_reason(doubts)
+    while (numbers := _unlikely(assessed, case.options)) or assessed.further_terms_fail:
+        if numbers:
+            doubts += [assessed.causes[k] for k in numbers]
+            found = found.without_names(numbers)
+            found = replace(found, reason="" if found.selection.proven else _unlikely_reason(doubts))
         else:
-            selection = selection.with_named_alone
-        assessed = assess(selection, case, gains, reason, rng, several=several, doubts=doubts)
-    return selection, assessed
+            found = replace(found, selection=found.selection.with_named_alone)
+        assessed = assess(found, case, rng, with_others=with_others, doubts=doubts)
+    return found, assessed
 
 
-def _unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
-    """Return the indices of the named terms whose probability is below `least_probability`."""
-    return tuple(k for k in range(len(found.named)) if found.causes[k].confidence < rules.least_probability)
+def _unlikely(assessed: Assessment, rules: NamingRules) -> tuple[int, ...]:
+    """Return the numbers of the named terms whose probability is below `least_probability`."""
+    return tuple(k for k in range(len(assessed.named)) if assessed.causes[k].confidence < rules.least_probability)
 
 
 def _unlikely_reason(doubts: Sequence[Named]) -> str:
@@ -213,7 +201,7 @@ def _unlikely_reason(doubts: Sequence[Named]) -> str:
     return f"no effect is named: {names} {said} more likely absent than present"
 
 
-def _named(
+def _with_evidence(
     selection: Selection, case: Case, gains: Sequence[Gain | None], declared: int, rng: np.random.Generator
 ) -> tuple[Named, ...]:
     """Return the terms of the chosen fit behind the first `declared` ones, with parameters and confidence."""

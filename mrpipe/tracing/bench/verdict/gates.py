@@ -40,7 +40,7 @@ def errors_on_validation(
     """Return the errors on the validation tests, with the thresholds from the options of the tracing."""
     return on_validation(
         base, chosen, baseline, training, validation, options.rules.validation,
-        own_offsets=own_offsets, record_gain=options.record_gain,
+        noise_rules=options.rules.noise, own_offsets=own_offsets, record_gain=options.record_gain,
     )  # fmt: skip
 
 
@@ -191,7 +191,7 @@ def with_calibrated_probability(
     judgement: VerdictWithEvidence,
     rules: NamingRules,
     *,
-    several: bool,
+    with_others: bool,
     beyond: bool = False,
     chosen: bool = True,
 ) -> Named:
@@ -205,7 +205,7 @@ def with_calibrated_probability(
         The verdict on the validation tests.
     rules
         Rules that contain the calibrated probabilities.
-    several
+    with_others
         Whether the effect is named together with others.
     beyond
         Whether a structured residual far above the noise remains, although no flexible model reproduces it.
@@ -221,5 +221,5 @@ def with_calibrated_probability(
     kind = judgement.verdict.kind
     evidence = item.confidence * (1.0 if kind == "explained" else judgement.evidence.share)
     partly = chosen and (beyond or kind == "partly explained")
-    probability = calibrated_probability(evidence, rules, several=several and chosen, partly=partly)
+    probability = calibrated_probability(evidence, rules, with_others=with_others and chosen, partly=partly)
     return replace(item, confidence=probability)

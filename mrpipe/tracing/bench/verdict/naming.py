@@ -105,7 +105,7 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
 
 
 def calibrated_probability(
-    evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False
+    evidence: float, rules: NamingRules, *, with_others: bool = False, partly: bool = False
 ) -> float:
     """Return the probability that an effect with this evidence is present, calibrated on the planted benchmark.
 
@@ -115,13 +115,13 @@ def calibrated_probability(
         See :func:`mrpipe.tracing.evidence.evidence_of`.
     rules
         Rules that contain the calibrated probabilities.
-    several
+    with_others
         Whether the effect is named together with others.
     partly
         Whether the named effects explain only part of what is missing.
     """
     alone = rules.calibration_of_part if partly else rules.calibration
-    known, probability = zip(*(rules.calibration_of_several if several else alone), strict=True)
+    known, probability = zip(*(rules.calibration_of_several if with_others else alone), strict=True)
     return round(float(np.interp(evidence, known, probability)), 3)
 
 

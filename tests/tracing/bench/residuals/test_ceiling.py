@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.tracing.bench.residuals.ceiling import flexible_chi_square, lagged_states
+from mrpipe.tracing.bench.residuals.ceiling import MOST_ROWS, Ceiling, _trees, flexible_chi_square, lagged_states
 from tests.tracing.bench.fits import plain_fit
 
 pytestmark = pytest.mark.planted
@@ -30,3 +30,23 @@ def test_the_past_that_the_flexible_model_sees_does_not_cross_tests() -> None:
     # the last column is the drive of a while ago: at the first sample of a test it is the drive of that sample
     assert columns[first, -1] == recordings.drive[first]
     assert columns.shape[0] == len(recordings.force)
+
+
+def test_the_trees_draw_no_random_number() -> None:
+    rng = np.random.default_rng(4)
+    states = rng.standard_normal((2 * MOST_ROWS, 2))
+    target = np.sin(states[:, 0]) + 0.1 * rng.standard_normal(len(states))
+    first, second = (_trees(3).set_params(random_state=seed).fit(states, target) for seed in (0, 1))
+    np.testing.assert_array_equal(first.predict(states), second.predict(states))
+
+
+def test_the_interval_of_the_error_is_drawn_from_the_generator_that_is_passed() -> None:
+    recordings = plain_fit("accumulator").problem.recordings
+    rng = np.random.default_rng(5)
+    size = len(recordings.force)
+    pieces = np.arange(size) * 30 // size
+    found = Ceiling(recordings, np.ones(size), (1.0 + 0.05 * pieces) * rng.standard_normal(size), pieces)
+    error, (low, high) = found.nrmse(recordings.used, np.random.default_rng(6))
+    assert low < error < high
+    assert found.nrmse(recordings.used, np.random.default_rng(6)) == (error, (low, high))
+    assert found.nrmse(recordings.used, np.random.default_rng(7)) != (error, (low, high))

@@ -15,6 +15,7 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.fitting.start import base_of, best_fit, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.tracing.bench.rig import hysteresis
@@ -66,9 +67,9 @@ def outcome(driver: bool) -> tuple[Selection, Selection, str]:
     """Return the selection before and after the comparison, and the reason."""
     before = selected(driver)
     unseen = Unseen(4, 100, np.random.default_rng(3))
-    after, gains, reason = without_laws_of_drive(before, [None], 0, unseen)
-    assert len(gains) == after.proven
-    return before, after, reason
+    after = without_laws_of_drive(NamedEffects(before, (None,), declared=0), unseen)
+    assert len(after.gains) == after.selection.proven
+    return before, after.selection, after.reason
 
 
 def test_a_law_of_the_yield_force_that_saturates_takes_the_place_of_the_effect() -> None:

@@ -14,6 +14,7 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.rivals.linear_memory import with_linear_memory, without_beaten_names
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.tracing.bench.fits import fit_of
@@ -49,8 +50,9 @@ def names(case: str, effect: str, form: str) -> tuple[list[str], int, str]:
     chosen = fit(problem, start, iterations=25)
     selection = Selection(base, 0.1 * chosen.chi_square, (), chosen, proven=1)
     unseen = Unseen(3, 100, np.random.default_rng(1))
-    kept, _, reason = without_beaten_names(selection, [None], 0, unseen)
-    return [item.effect.name for item in kept.chosen.problem.terms], kept.proven, reason
+    found = without_beaten_names(NamedEffects(selection, (None,), declared=0), unseen)
+    kept = found.selection
+    return [item.effect.name for item in kept.chosen.problem.terms], kept.proven, found.reason
 
 
 def test_half_a_derivative_is_not_called_migration() -> None:

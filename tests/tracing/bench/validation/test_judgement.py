@@ -92,18 +92,18 @@ def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
 def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
     less, more = sorted(pair)
     rules = NamingRules()
-    for several in (False, True):
+    for with_others in (False, True):
         assert (
             0.0
-            <= calibrated_probability(less, rules, several=several)
-            <= calibrated_probability(more, rules, several=several)
+            <= calibrated_probability(less, rules, with_others=with_others)
+            <= calibrated_probability(more, rules, with_others=with_others)
             < 1.0
         )
         assert (
             calibrated_probability(less, rules, partly=True) <= calibrated_probability(more, rules, partly=True) < 1.0
         )
     # one of several effects may correct the form of another
-    assert calibrated_probability(more, rules, several=True) <= calibrated_probability(more, rules)
+    assert calibrated_probability(more, rules, with_others=True) <= calibrated_probability(more, rules)
     # an effect that leaves something may stand for one that the library lacks
     assert calibrated_probability(more, rules, partly=True) <= calibrated_probability(more, rules)
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import Fit, fit, start_of
-from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.selection.select import Selection
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.bench.verdict import assess as module
 from mrpipe.tracing.bench.verdict.assess import with_likely_names
 from mrpipe.tracing.options import TracingOptions
-from tests.tracing.bench.fits import plain_fit
+from tests.tracing.bench.fits import fit_with_terms, plain_fit
 from tests.tracing.bench.rig import campaign
 
 pytestmark = pytest.mark.planted
@@ -47,34 +45,22 @@ def test_a_further_term_that_does_not_lower_the_error_on_validation_is_left_out(
     assert found["after"]["nrmse"] <= 1.01 * found["before"]["nrmse"]
 
 
-def _two_terms() -> tuple[Fit, Fit]:
-    """Return a fit without effects, and one with two."""
-    plain, library = plain_fit("accumulator"), damper_effects()
-    terms = tuple(Term(library[name], library[name].forms[0]) for name in ("inertia", "accumulator"))
-    starts = [term.form.without_strength(plain.problem.scales) for term in terms]
-    for term, values in zip(terms, starts, strict=True):
-        for item in term.form.parameters:
-            if item.role == "strength":
-                values[item.name] = item.start_values(plain.problem.scales)[0]
-    problem = replace(plain.problem, terms=terms)
-    return plain, fit(problem, start_of(problem, plain.base_values, starts), iterations=10)
-
-
 def test_the_names_that_stay_are_judged_again_when_another_one_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without Stribeck friction an end stop had the probability 0.15, and was still named."""
-    plain, chosen = _two_terms()
+    plain = plain_fit("accumulator")
+    chosen = fit_with_terms("accumulator", ("inertia", "mass"), ("accumulator", "linear"))
     likely = [(0.9, 0.3), (0.15,), ()]
 
-    def assess(selection, case, gains, reason, rng, *, several=False, doubts=()):
-        assert several is (len(likely) < 3)
+    def assess(found, case, rng, *, with_others=False, doubts=()):
+        assert with_others is (len(likely) < 3)
         assert [item.confidence for item in doubts] == [0.3, 0.15][: 3 - len(likely)]
-        terms = selection.chosen.problem.terms
+        terms = found.selection.chosen.problem.terms
         causes = [SimpleNamespace(effect=t.effect, confidence=c) for t, c in zip(terms, likely.pop(0), strict=False)]
-        return SimpleNamespace(named=causes, causes=causes, further_terms_fail=False, reason=reason)
+        return SimpleNamespace(named=causes, causes=causes, further_terms_fail=False, reason=found.reason)
 
     monkeypatch.setattr(module, "assess", assess)
-    case = SimpleNamespace(options=TracingOptions(), declared=0)
-    selection = Selection(plain, 1.0, (), chosen, proven=2)
-    kept, found = with_likely_names(selection, case, [None, None], "", np.random.default_rng(1))
-    assert (kept.proven, likely, found.named) == (0, [], [])
+    case = SimpleNamespace(options=TracingOptions())
+    named = NamedEffects(Selection(plain, 1.0, (), chosen, proven=2), (None, None), declared=0)
+    kept, found = with_likely_names(named, case, np.random.default_rng(1))
+    assert (kept.selection.proven, kept.gains, likely, found.named) == (0, (), [], [])
     assert "accumulator (probability 0.30), inertia (probability 0.15) lower the error" in found.reason

@@ -65,15 +65,17 @@ def test_an_effect_that_explains_a_part_is_less_probable() -> None:
     item = Named(damper_effects()["migration"], "slow-hysteresis", {}, 0.98)
     evidence = Evidence(0.05, 0.018, 0.004, 0.012, (), structured=True, effects=True)
 
-    def confidence(kind: VerdictClass, *, chosen: bool = True, several: bool = False) -> float:
+    def confidence(kind: VerdictClass, *, chosen: bool = True, with_others: bool = False) -> float:
         judgement = VerdictWithEvidence(Verdict(kind, ""), evidence, 0.012, (0.012, 0.012), None)
-        return with_calibrated_probability(item, judgement, NamingRules(), several=several, chosen=chosen).confidence
+        return with_calibrated_probability(
+            item, judgement, NamingRules(), with_others=with_others, chosen=chosen
+        ).confidence
 
     assert confidence("explained") > 0.9
     assert NamingRules().least_probability < confidence("partly explained") < 0.7
     # offsets are measured test by test: nothing else can be taken for them
     assert confidence("partly explained", chosen=False) > 0.9
-    assert confidence("explained", several=True) < 0.8
+    assert confidence("explained", with_others=True) < 0.8
 
 
 def test_the_verdict_says_which_effects_the_tests_do_not_separate() -> None:
