@@ -1,4 +1,4 @@
-"""Several tests in one file: groups of columns (`run1/force`, `run2/force`), each of which is a test of its own."""
+"""Several tests in one file: groups of columns (`run1/force`, `run2/force`), each of which is a separate test."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
 
 
 def _clock(channel: Any) -> tuple[float, float, int] | None:
-    """Return start [s], interval [s] and number of samples of a channel, None where it is no waveform."""
+    """Return start [s], interval [s] and number of samples of a channel, None where it is not a waveform."""
     step = float(channel.properties.get("wf_increment", 0.0))
     return (float(channel.properties.get("wf_start_offset", 0.0)), step, len(channel)) if step > 0.0 else None
 
