@@ -14,6 +14,11 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def some(names: Sequence[str]) -> str:
+    """Return the first three names, with dots where there are more: `a, b, c, ...`."""
+    return ", ".join([*names[:3], *(["..."] if names[3:] else [])])
+
+
 def shell_word(text: str | Path) -> str:
     """Return a path or value as one word of a command that can be copied into a shell."""
     return shlex.quote(str(text))

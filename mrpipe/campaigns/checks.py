@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -185,18 +185,30 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
     """
     if not drives:
         raise UserError(source, "drive", "is not recorded in any training test", "an inverse model needs a drive")
-    # the mean over a twentieth of each record separates a level from the noise on it
-    levels = np.concatenate(
-        [[block.mean() for block in np.array_split(item, 20) if block.size] for item in drives.values()]
-    )
-    largest = float(np.abs(levels).max())
-    if float(np.ptp(levels)) <= 0.01 * largest or largest == 0.0:
+    levels = _levels(drives.values())
+    if not _vary(levels):
         raise UserError(
             source,
             "drive",
             f"never changes in the training tests ({levels.mean():.4g})",
-            "an inverse model needs training tests at two or more drives, or leave out the stages that use it",
+            "an inverse model needs training tests at two or more drives; without them, leave train-inverse and the "
+            "stages that use it out of `stages` in the configuration",
         )
+
+
+def drive_varies(drives: Iterable[FloatArray]) -> bool:
+    """Whether drives, shape (n,) for each test, determine an inverse model (:func:`require_varying`)."""
+    return _vary(_levels(drives))
+
+
+def _levels(drives: Iterable[FloatArray]) -> FloatArray:
+    # the mean over a twentieth of each record separates a level from the noise on it
+    return np.concatenate([[block.mean() for block in np.array_split(item, 20) if block.size] for item in drives])
+
+
+def _vary(levels: FloatArray) -> bool:
+    largest = float(np.abs(levels).max())
+    return bool(largest > 0.0 and float(np.ptp(levels)) > 0.01 * largest)
 
 
 def require_roles(campaign: Campaign, source: str) -> None:

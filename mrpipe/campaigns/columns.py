@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,10 @@ class DataFile:
         Other spellings of a name.
     headers
         Header lines of a text file, one word per column; empty for other formats.
+    units
+        Column -> unit as the file states it next to the name (TDMS, MDF, HDF5); columns without one are left out.
+    clocks
+        Column -> start [s], interval [s] and number of samples of its clock, where each column of a file has its own.
     accelerations
         Columns that are known to be accelerations [m/s^2], as those of strong-motion records are: name -> whether
         horizontal.
@@ -65,11 +69,31 @@ class DataFile:
     row_lines: tuple[int, ...] = ()
     aliases: Mapping[str, str] = field(default_factory=dict)
     headers: tuple[tuple[str, ...], ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    clocks: Mapping[str, tuple[float, float, int]] = field(default_factory=dict)
     accelerations: Mapping[str, bool] = field(default_factory=dict)
 
     def line_of(self, sample: int) -> int:
         """Return the line of a sample in a text file, for messages; its number from 0 where lines mean nothing."""
         return self.row_lines[sample] if sample < len(self.row_lines) else self.first_row + sample
+
+    def with_clock_of(self, columns: Iterable[str | int]) -> DataFile:
+        """Return the file with the clock of these columns as its own, where each column has a clock and they agree.
+
+        Raises
+        ------
+        UserError
+            If there is no such column.
+        """
+        if not self.clocks:
+            return self
+        clocks = {self.clocks.get(self._resolve(column, "")[0]) for column in columns}
+        clock = next(iter(clocks)) if len(clocks) == 1 else None
+        if clock is None:
+            return replace(self, time_s=None, sampling_rate_hz=None)
+        start, step, count = clock
+        time: FloatArray = np.asarray(start + step * np.arange(count), dtype=np.float64)
+        return replace(self, time_s=time, sampling_rate_hz=1.0 / step)
 
     def column(self, column: str | int, where: str) -> FloatArray:
         """Return one column, shape (n,).

@@ -238,7 +238,8 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
         raise reader.source.error(place, "no channel is read from the file", "give at least one channel a column")
     samples = _one_length(file, columns, where)
     rate = entry.sampling_rate_hz or reader.entry.sampling_rate_hz
-    clock = build_clock(file, columns.pop("time", None), rate, samples, where)
+    own = file.with_clock_of(channels[name].column or 0 for name in columns)
+    clock = build_clock(own, columns.pop("time", None), rate, samples, where)
     reader.findings += [f"test {entry.name}: {line}" for line in clock.findings]
     for name, channel in channels.items():
         if channel.value is not None:

@@ -234,7 +234,8 @@ def _print_project(project: Project, directory: Path) -> None:
             print(f"  check: {line}")
         for line in item.skipped:
             print(f"  not used: {line}")
-    verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
+    unsure = any(item.unsure for item in project.proposals)
+    verb = "check the lines marked UNSURE in" if unsure else "check" if project.proposals else "fill in"
     files = listed([str(directory / item / CAMPAIGN_FILE) for item in project.campaigns])
     print(f"next: {verb} {files},")
     config = shell_word(f"configs/{project.name}.yaml")

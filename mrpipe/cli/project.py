@@ -65,12 +65,15 @@ _CONFIG = """\
 # Every setting that is not named here has its default: `mrpipe check --explain` lists them all.
 name: {name}
 description: {what}
-stages: {stages}
+{note}stages: {stages}
 campaigns:
   bench: {bench}
   frame: {frame}
   closed_loop: {closed_loop}
 """
+_ONE_DRIVE = (
+    "# train-inverse is left out, because the training tests have one drive only; it needs tests at two or more.\n"
+)
 _README = """\
 # {name}
 {campaigns} what was measured, `configs/{name}.yaml` what mrpipe does with
@@ -169,11 +172,15 @@ def _readme(name: str, campaigns: Sequence[str]) -> str:
 def _config(name: str, folders: dict[str, str], proposals: Sequence[Proposal]) -> str:
     kind = "both" if len(folders) > 1 else next(iter(folders))
     frame = f"../data/{folders['frame']}" if "frame" in folders else "null"
+    stages, note = STAGES[kind], ""
+    if kind == "bench" and proposals and not proposals[0].drive_varies:
+        stages, note = stages.replace("train-inverse, ", ""), _ONE_DRIVE
     closed_loop = any(role == "closed-loop" for item in proposals for _, role in item.tests)
     return _CONFIG.format(
         name=name,
         what=_WHAT[kind],
-        stages=STAGES[kind],
+        stages=stages,
+        note=note,
         bench=f"../data/{folders['bench']}" if "bench" in folders else "null",
         frame=frame,
         closed_loop=frame if closed_loop else "null",

@@ -13,7 +13,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.plausibility.reference import mean_frequency
 from mrpipe.campaigns.proposal.samples import has_few_levels, motion_and_force
-from mrpipe.campaigns.proposal.words import Header, read_header
+from mrpipe.campaigns.proposal.words import Header, read_header, read_path
 from mrpipe.errors import UserError
 from mrpipe.words import counted, listed
 
@@ -75,9 +75,10 @@ class Layout:
 
 
 def columns_of(file: DataFile) -> list[Column]:
-    """Return the columns of numbers of a file; matrices are split into their columns."""
+    """Return the columns of numbers of a file, of all lengths; matrices are split into their columns."""
     found: list[Column] = []
-    unit_rows = _unit_rows(file)
+    stated = {**_unit_rows(file), **file.units}
+    separator = separator_of(file)
     for name in file.names[:MOST_COLUMNS]:
         for column in (name, *(f"{name}[:,{index}]" for index in range(_width(file, name)))):
             try:
@@ -86,10 +87,15 @@ def columns_of(file: DataFile) -> list[Column]:
                 continue
             if np.isfinite(values).sum() > FEWEST_SAMPLES:
                 known = name in file.accelerations
-                header = _of_a_record(name) if known else read_header(column.split("[:,")[0], unit_rows.get(name, ""))
+                header = _of_a_record(name) if known else read_path(name, separator, stated.get(name, ""))
                 found.append(Column(column, header, values))
-    longest = max((item.values.size for item in found), default=0)
-    return [item for item in found if item.values.size == longest]
+    return found
+
+
+def separator_of(file: DataFile) -> str:
+    """Return the sign between a group and a channel in the names of a file's columns, empty where it has no groups."""
+    paths = [name for name in file.names if "/" in name]
+    return "/" if paths else "" if file.table else "."
 
 
 def _of_a_record(name: str) -> Header:

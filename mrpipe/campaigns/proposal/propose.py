@@ -12,6 +12,7 @@ import numpy as np
 
 from mrpipe import units
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.checks import drive_varies
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.files import all_readers, ending_of
 from mrpipe.campaigns.proposal.columns import (
@@ -22,8 +23,10 @@ from mrpipe.campaigns.proposal.columns import (
     lay_out_bench,
     lay_out_frame,
     open_columns,
+    separator_of,
     share_units,
 )
+from mrpipe.campaigns.proposal.groups import groups_taken, same_length, tests_in_file
 from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, kind_of_record, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
     Condition,
@@ -35,7 +38,7 @@ from mrpipe.campaigns.proposal.roles import (
 from mrpipe.campaigns.proposal.text import TestText, campaign_text
 from mrpipe.campaigns.proposal.unreadable import unreadable_channels, why_no_columns
 from mrpipe.errors import UserError
-from mrpipe.words import counted
+from mrpipe.words import counted, some
 
 Rig = Literal["bench", "frame", "both"]
 
@@ -58,6 +61,8 @@ class Proposal:
         What the user should check, one line each.
     skipped
         Files that could not be read, with the reason.
+    drive_varies
+        Whether the training tests of a bench have more than one drive, as an inverse model needs.
     """
 
     rig: Literal["bench", "frame"]
@@ -66,6 +71,7 @@ class Proposal:
     tests: tuple[tuple[str, str], ...]
     unsure: tuple[str, ...]
     skipped: tuple[str, ...]
+    drive_varies: bool = True
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,7 @@ class _File:
     file: DataFile
     columns: list[Column]
     layout: Layout
+    group: str = ""
 
     @property
     def rate(self) -> float:
@@ -121,9 +128,7 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
             reason = single if file.accelerations else why_no_columns(file)
             skipped.append(f"{path.relative_to(folder)}: {reason}")
             continue
-        as_frame = rig == "frame" or (rig != "bench" and (bool(file.accelerations) or floor_columns(columns) >= 2))
-        layout = lay_out_frame(columns, file) if as_frame else lay_out_bench(columns, file)
-        files.append(_File(path, file, columns, layout))
+        files += _tests_of(path, file, columns, rig)
     if not files:
         reason = f" ({skipped[0]})" if skipped else ""
         raise UserError(
@@ -144,6 +149,20 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     return proposals
 
 
+def _tests_of(path: Path, file: DataFile, columns: list[Column], rig: Rig | None) -> list[_File]:
+    """Return the tests of a file: one, or several of a bench where groups of columns are tests."""
+    groups = tests_in_file(columns, separator_of(file))
+    of_a_frame = bool(file.accelerations) or max(floor_columns(members) for _, members in groups) >= 2
+    if rig == "frame" or (rig != "bench" and of_a_frame):
+        members = same_length(columns)
+        return [_File(path, file, members, lay_out_frame(members, file))]
+    tests = []
+    for group, members in groups:
+        own = file.with_clock_of(item.name for item in members)
+        tests.append(_File(path, own, members, lay_out_bench(members, own), group))
+    return tests
+
+
 def _data_files(folder: Path) -> list[Path]:
     known = all_readers()
     found = sorted(path for path in folder.rglob("*") if path.is_file() and ending_of(path) in known)
@@ -162,7 +181,7 @@ def _propose(
             if not any(key in item.layout.channels for item in files)
         ]
         unsure += [
-            f"test {_test_name(item.path, folder)}: no {key} found in {item.path.name}; write its column and unit"
+            f"test {_test_name(item, folder)}: no {key} found in {item.path.name}; write its column and unit"
             for key in ("displacement", "force")
             for item in files
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
@@ -194,15 +213,18 @@ def _propose(
             found.setdefault(key, guess)
     channels = {key: f"{guess.column or guess.value} [{guess.unit}]" for key, guess in found.items()}
     listed = tuple((item.name, ", ".join(word for word in (item.kind, item.role) if word)) for item in tests)
-    return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped))
+    varies = not bench or _drive_varies(files, tests)
+    return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped), varies)
 
 
 def _not_used(files: list[_File]) -> list[str]:
     """Return a line for each column that names a channel and cannot be read; files with the same column share it."""
     found: dict[str, list[str]] = {}
-    for item in files:
-        for column, why in unreadable_channels(item.file, item.columns).items():
-            found.setdefault(column, []).append(f"{item.path.name}: {why}")
+    for path in dict.fromkeys(item.path for item in files):
+        parts = [item for item in files if item.path == path]
+        columns = [column for item in parts for column in item.columns]
+        for name, why in unreadable_channels(parts[0].file, columns).items():
+            found.setdefault(name, []).append(f"{path.name}: {why}")
     return [
         f"column {column} is not used: {lines[0]}" + (f" (and in {len(lines) - 1} other files)" if lines[1:] else "")
         for column, lines in found.items()
@@ -244,37 +266,41 @@ def _guessed_in_tests(tests: Sequence[TestText]) -> list[str]:
             if guess.unsure and guess.column:
                 found.setdefault((key, guess.column, guess.unsure), []).append(test.name)
     return [
-        f"channel {key} of {counted(len(names), 'test')} ({', '.join(names[:3])}{', ...' if names[3:] else ''}), "
-        f"column {column}: {why}"
+        f"channel {key} of {counted(len(names), 'test')} ({some(names)}), column {column}: {why}"
         for (key, column, why), names in found.items()
     ]
 
 
-def _test_name(path: Path, folder: Path) -> str:
-    relative = path.relative_to(folder)
-    parts = [*relative.parent.parts, relative.name[: -len(ending_of(path))]]
-    return "-".join(parts).replace(" ", "_").strip(".") or "test"
+def _test_name(item: _File, folder: Path) -> str:
+    relative = item.path.relative_to(folder)
+    parts = [*relative.parent.parts, relative.name[: -len(ending_of(item.path))], *item.group.split("/")]
+    return "-".join(filter(None, parts)).replace(" ", "_").strip(".") or "test"
 
 
 def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
-    notes: list[str] = []
-    tests, conditions = [], []
+    notes = groups_taken([(item.path.name, item.group) for item in files])
+    tests, conditions, without = [], [], []
     for item in files:
         own = _own(item, shared)
         drive = item.layout.channels.get("drive")
         if drive is None:
-            stated = drive_in_name(item.path.stem)
+            stated = drive_in_name(item.group) or drive_in_name(item.path.stem)
             value, unit = stated or (0.0, "A")
             own["drive"] = Guess(
                 "", unit, "" if stated else "no drive in the file or its name: 0 A is a placeholder", value=value
             )
             if not stated:
-                notes.append(f"test {_test_name(item.path, folder)}: drive not found, 0 A is a placeholder")
+                without.append(_test_name(item, folder))
         conditions.append(_condition(item, own))
         tests.append(
-            TestText(name=_test_name(item.path, folder), file=item.path.relative_to(folder).as_posix(), channels=own)
+            TestText(name=_test_name(item, folder), file=item.path.relative_to(folder).as_posix(), channels=own)
         )
-    found = propose_roles([item.path for item in files], conditions)
+    if without:
+        notes.append(
+            f"drive: neither a column nor the name of the file gives it in {counted(len(without), 'test')} "
+            f"({some(without)}): 0 A is a placeholder; write the current or voltage at which they were made"
+        )
+    found = propose_roles([item.path if not item.group else item.path / item.group for item in files], conditions)
     if len(files) == 1:
         time = files[0].layout.channels.get("time")
         clock = files[0].samples(time.column) * units.conversion(time.unit) if time else None
@@ -292,6 +318,16 @@ def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
     if "repeated" not in found.why and "names" not in found.why:
         notes.append(f"roles: {found.why}")
     return tests, found.why, notes
+
+
+def _drive_varies(files: list[_File], tests: Sequence[TestText]) -> bool:
+    drives = []
+    for item, test in zip(files, tests, strict=False):
+        if test.role == "training":
+            drive = item.layout.channels.get("drive") or test.channels["drive"]
+            values = item.samples(drive.column) if drive.column else np.full(2, drive.value or 0.0)
+            drives.append(np.nan_to_num(values) * units.conversion(drive.unit))
+    return not drives or drive_varies(drives)
 
 
 def _condition(item: _File, own: dict[str, Guess]) -> Condition:
@@ -317,7 +353,7 @@ def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
     ]
     roles = propose_frame_roles([item.path for item in files], [kind for kind, _ in kinds])
     for item, (kind, doubt), role in zip(files, kinds, roles, strict=True):
-        name = _test_name(item.path, folder)
+        name = _test_name(item, folder)
         if doubt:
             notes.append(f"test {name}: kind {kind}, {doubt}")
         law = law_of(item.path) if kind == "closed-loop" else ""

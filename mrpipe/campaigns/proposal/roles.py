@@ -108,7 +108,8 @@ def propose_roles(paths: Sequence[Path], conditions: Sequence[Condition]) -> Rol
     if repeated:
         for group in repeated:
             roles[group[-1]] = "validation"
-        return Roles(tuple(roles), f"the last of each of the {len(repeated)} groups of repeated tests validates")
+        several = f"each of the {len(repeated)} groups" if len(repeated) > 1 else "the only group"
+        return Roles(tuple(roles), f"the last of {several} of repeated tests validates")
     order = sorted(range(len(paths)), key=lambda index: (conditions[index].drive, conditions[index].amplitude))
     inner = order[1:-1] if len(order) > 2 else order[-1:]
     wanted = max(1, len(paths) // 4)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mrpipe import units
 from mrpipe.errors import UserError
@@ -103,6 +103,21 @@ def read_header(text: str, unit_row: str = "") -> Header:
         damper=any(word in DAMPER for word in words),
         support=bool(SUPPORTS & set(words)) and not (GROUND | DECK) & set(words),
     )
+
+
+def read_path(name: str, separator: str, unit_row: str = "") -> Header:
+    """Return what the name of a channel in a group says (`run 1/force`); an empty separator means that there is none.
+
+    The channel comes before its group. A single letter of the group names no quantity, because `v_rand/temp` is no
+    velocity.
+    """
+    whole = read_header(name, unit_row)
+    group, _, channel = name.rpartition(separator) if separator else ("", "", name)
+    # with a unit, the separator may be that of the unit: `Weg/mm`
+    if not group or whole.unit:
+        return whole
+    inner = read_header(channel).quantity
+    return replace(whole, quantity=inner or _quantity([word for word in split_words(name) if len(word) > 2], ""))
 
 
 def split_words(text: str) -> list[str]:

@@ -15,10 +15,14 @@ from mrpipe.campaigns.schema import TextEntry
 _SPARSE = "MATLAB_sparse"
 """Attribute of a group that holds a sparse matrix of MATLAB 7.3; its value is the number of rows."""
 
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+"""Attributes of a dataset that hold its unit; `units` is that of netCDF."""
+
 
 def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
     """Return the datasets of an HDF5 file; each field of a compound dataset is one column."""
     names: list[str] = []
+    units: dict[str, str] = {}
 
     def note(name: str, item: Any) -> None:
         if _SPARSE in item.attrs:
@@ -28,6 +32,8 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
         elif isinstance(item, h5py.Dataset) and not name.startswith("#"):
             fields = item.dtype.names
             names.extend(f"{name}/{field}" for field in fields) if fields else names.append(name)
+            if not fields and (unit := _unit(item.attrs)):
+                units[name] = unit
 
     with h5py.File(path, "r") as handle:
         handle.visititems(note)
@@ -52,7 +58,15 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
         fetch=fetch,
         sampling_rate_hz=None if rate is None else float(rate),
         aliases=aliases,
+        units=units,
     )
+
+
+def _unit(attributes: Any) -> str:
+    """Return the unit that the attributes of a dataset state, empty where they state none."""
+    stated = (attributes[key] for key in UNIT_ATTRIBUTES if key in attributes)
+    texts = (item.decode("utf-8", "replace") if isinstance(item, bytes) else item for item in stated)
+    return next((text.strip() for text in texts if isinstance(text, str)), "")
 
 
 def _sparse(path: Path, group: Any) -> Any:

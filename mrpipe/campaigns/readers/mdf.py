@@ -21,12 +21,16 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     asammdf = optional("asammdf", "asammdf", "mdf", path)
     places: dict[str, tuple[int, int]] = {}
     clock = np.zeros(0)
+    units: dict[str, str] = {}
     with asammdf.MDF(str(path)) as file:
         masters = dict(file.masters_db)
         for name, entries in file.channels_db.items():
             for group, index in entries:
                 if masters.get(group) != index:
-                    places[name if len(entries) == 1 else f"{name}#{group}"] = (group, index)
+                    label = name if len(entries) == 1 else f"{name}#{group}"
+                    places[label] = (group, index)
+                    if unit := str(file.get_channel_unit(group=group, index=index) or "").strip():
+                        units[label] = unit
         for group in {group for group, _ in places.values()}:
             times = np.asarray(file.get_master(group), dtype=np.float64)
             clock = times if times.size > clock.size else clock
@@ -49,6 +53,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
         table=True,
         time_s=clock,
         sampling_rate_hz=constant_rate(clock),
+        units=units,
     )
 
 

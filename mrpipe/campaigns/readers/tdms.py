@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mrpipe.campaigns.columns import DataFile
-from mrpipe.campaigns.readers.reader import Reader, constant_rate, optional, short_names
+from mrpipe.campaigns.readers.reader import Reader, optional, short_names
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
+
+UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+"""Properties of a channel that hold its unit: of DIAdem and LabVIEW waveforms, and of DAQmx."""
 
 
 def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     """Return the channels as `group/channel`; a channel's name alone will do where it is unique.
 
-    The clock is that of the waveform properties (`wf_increment`), if the first channel has them.
+    The clock of a channel is that of its waveform properties (`wf_increment`); groups may have different clocks.
     """
     nptdms = optional("nptdms", "npTDMS", "tdms", path)
     file = nptdms.TdmsFile.read_metadata(str(path))
@@ -29,12 +33,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     if not channels:
         raise UserError(path, "", "holds no channel with samples", "export the measurement again")
     names = list(channels)
-    step = float(channels[names[0]].properties.get("wf_increment", 0.0))
-    same = all(float(item.properties.get("wf_increment", 0.0)) == step for item in channels.values())
-    start = float(channels[names[0]].properties.get("wf_start_offset", 0.0))
-    time = None
-    if step > 0.0 and same:
-        time = np.asarray(start + step * np.arange(len(channels[names[0]])), dtype=np.float64)
+    clocks = {name: clock for name, item in channels.items() if (clock := _clock(item))}
 
     def fetch(name: str) -> Any:
         group, _, channel = name.partition("/")
@@ -44,15 +43,27 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
             return (values - values[0]) / np.timedelta64(1, "s")
         return values
 
-    return DataFile(
+    file = DataFile(
         path=path,
         names=tuple(names),
         fetch=fetch,
         table=True,
-        time_s=time,
-        sampling_rate_hz=None if time is None else constant_rate(time),
+        clocks=clocks,
         aliases=short_names(names, "/"),
+        units={name: unit for name, item in channels.items() if (unit := _unit(item.properties))},
     )
+    return file.with_clock_of(names)
+
+
+def _clock(channel: Any) -> tuple[float, float, int] | None:
+    """Return start [s], interval [s] and number of samples of a channel, None where it is not a waveform."""
+    step = float(channel.properties.get("wf_increment", 0.0))
+    return (float(channel.properties.get("wf_start_offset", 0.0)), step, len(channel)) if step > 0.0 else None
+
+
+def _unit(properties: Mapping[str, Any]) -> str:
+    """Return the unit that the properties of a channel state, empty where they state none."""
+    return next((text for key in UNIT_PROPERTIES if (text := str(properties.get(key, "")).strip())), "")
 
 
 READER = Reader((".tdms",), _read)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
+import nptdms
 import numpy as np
 import pytest
 import yaml
+from asammdf import MDF, Signal
 from scipy.io import savemat
 
 from mrpipe.campaigns import load_campaign
@@ -14,7 +17,8 @@ from mrpipe.campaigns.plausibility import judge
 from mrpipe.campaigns.proposal import Proposal, propose_campaigns
 from mrpipe.campaigns.proposal.kinds import GAINS, law_of
 from mrpipe.campaigns.proposal.roles import propose_frame_roles
-from mrpipe.campaigns.proposal.words import read_header
+from mrpipe.campaigns.proposal.words import read_header, read_path
+from mrpipe.cli.project import lay_out
 from mrpipe.control.laws import law_named
 from mrpipe.errors import UserError
 from tests.campaigns.plausibility.rig import sound_tests
@@ -65,6 +69,130 @@ def _proposed(folder: Path, beside: Path, rig: str | None = None) -> tuple[Propo
     beside.mkdir(parents=True)
     (beside / "campaign.yaml").write_text(proposal.text, encoding="utf-8")
     return proposal, beside
+
+
+def _write_with_units(folder: Path, ending: str) -> None:
+    """Write two tests whose files state mm and kN next to the names of the channels."""
+    folder.mkdir()
+    for index, test in enumerate(sound_tests(2, seed=1)):
+        time, path = test.time_s, folder / f"t{index}{ending}"
+        stated = {"Displacement": (1e3 * test.displacement_m, "mm"), "Force": (1e-3 * test.force_n, "kN")}
+        if ending == ".tdms":
+            clock = {"wf_increment": float(time[1] - time[0]), "wf_start_offset": 0.0}
+            with nptdms.TdmsWriter(str(path)) as writer:
+                writer.write_segment(
+                    [
+                        nptdms.ChannelObject("rig", name, values, properties={**clock, "unit_string": unit})
+                        for name, (values, unit) in stated.items()
+                    ]
+                )
+        elif ending == ".mf4":
+            file = MDF(version="4.10")
+            file.append([Signal(values, time, name=name, unit=unit) for name, (values, unit) in stated.items()])
+            file.save(path)
+        else:
+            with h5py.File(path, "w") as handle:
+                handle["t"] = time
+                for name, (values, unit) in stated.items():
+                    handle[name] = values
+                    handle[name].attrs["units"] = unit
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("ending", [".tdms", ".mf4", ".h5"])
+def test_units_that_a_file_states_beside_the_names(tmp_path: Path, ending: str) -> None:
+    """The unit was guessed from the amplitude, although the file states it: kN for a force of 200 became N."""
+    _write_with_units(tmp_path / "m", ending)
+    proposal, _ = _proposed(tmp_path / "m", tmp_path / "p" / "data" / "own")
+    assert proposal.channels["displacement"].endswith("[mm]") and proposal.channels["force"].endswith("[kN]")
+    assert not any("no unit" in line for line in proposal.unsure if "time" not in line)
+
+
+@pytest.mark.planted
+def test_groups_of_one_file_are_tests(tmp_path: Path) -> None:
+    """Only the columns of the longest group were used, as if the file held one test."""
+    (tmp_path / "m").mkdir()
+    tests = sound_tests(4, seed=1)
+    with h5py.File(tmp_path / "m" / "all.h5", "w") as handle:
+        for index, test in enumerate(tests):
+            group = handle.create_group(f"v_run{index}")
+            count = test.time_s.size - 100 * index
+            for name, values in (
+                ("time_s", test.time_s),
+                ("disp_mm", 1e3 * test.displacement_m),
+                ("current_A", test.drive),
+                ("force_N", test.force_n),
+                ("temp", 20.0 + test.time_s),
+            ):
+                group[name] = values[:count]
+    proposal, beside = _proposed(tmp_path / "m", tmp_path / "p" / "data" / "own")
+    campaign = load_campaign(beside)
+    assert [item.name for item in campaign.recordings] == [f"all-v_run{index}" for index in range(4)]
+    assert "velocity" not in proposal.channels  # the v of the group had made one of the temperature
+    assert any("4 groups" in line for line in proposal.unsure)
+    for index, test in enumerate(campaign.recordings):
+        np.testing.assert_allclose(test.channels["force"], tests[index].force_n[: test.time_s.size], atol=1e-9)
+
+
+@pytest.mark.planted
+def test_groups_of_a_waveform_file_have_their_own_clocks(tmp_path: Path) -> None:
+    """The clock of the first channel was taken for all groups."""
+    (tmp_path / "m").mkdir()
+    tests = sound_tests(2, seed=1)
+    with nptdms.TdmsWriter(str(tmp_path / "m" / "all.tdms")) as writer:
+        for index, test in enumerate(tests):
+            clock = {"wf_increment": (1 + index) * float(test.time_s[1] - test.time_s[0]), "wf_start_offset": 0.0}
+            stated = {"Weg": (test.displacement_m, "m"), "Kraft": (test.force_n, "N"), "Strom": (test.drive, "A")}
+            writer.write_segment(
+                [
+                    nptdms.ChannelObject(
+                        f"run{index}", name, values[:: 1 + index], properties={**clock, "unit_string": unit}
+                    )
+                    for name, (values, unit) in stated.items()
+                ]
+            )
+    _, beside = _proposed(tmp_path / "m", tmp_path / "p" / "data" / "own")
+    rates = [item.sampling_rate_hz for item in load_campaign(beside).recordings]
+    assert rates[0] == pytest.approx(2.0 * rates[1])
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [
+        ("v_rand/temp", ""),
+        ("run1/F", "force"),
+        ("Force/Value", "force"),
+        ("Weg/mm", "displacement"),
+        ("v1/I_A", "current"),
+    ],
+)
+def test_the_channel_comes_before_its_group(name: str, quantity: str) -> None:
+    assert read_path(name, "/").quantity == quantity
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("several", [True, False])
+def test_a_single_drive_has_no_inverse_model(tmp_path: Path, several: bool) -> None:
+    """`init` had listed train-inverse in any case, and the run that it proposes was refused."""
+    (tmp_path / "m").mkdir()
+    for index, test in enumerate(sound_tests(3, seed=1)):
+        columns = [
+            test.time_s,
+            1e3 * test.displacement_m,
+            test.force_n,
+            *([0.0 * test.drive + index] if several else []),
+        ]
+        header = "t [s],x [mm],F [N]" + (",i [A]" if several else "")
+        np.savetxt(
+            tmp_path / "m" / f"t{index}.csv", np.column_stack(columns), delimiter=",", header=header, comments=""
+        )
+    project = lay_out(tmp_path / "p", source=tmp_path / "m")
+    config = (tmp_path / "p" / "configs" / "p.yaml").read_text(encoding="utf-8")
+    assert ("train-inverse, identify-damper" in config) is several
+    assert project.proposals[0].drive_varies is several
+    # one line for all tests, not one for each
+    assert sum("0 A is a placeholder" in line for line in project.proposals[0].unsure) == (not several)
 
 
 @pytest.mark.planted
