@@ -11,7 +11,6 @@ from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
-    CURRENT,
     FIRST,
     FORCE,
     HYSTERESIS,
@@ -24,6 +23,7 @@ from mrpipe.dampers.plant import (
     Step,
     change_yield_force,
 )
+from mrpipe.effects.amplitudes import multiplied
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
 from mrpipe.effects.profiles import PATH, RISING, SINCE, free_profile
 
@@ -66,14 +66,8 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         direction = 1.0 if wire[VELOCITY] > 0.0 else -1.0
         state[0] = direction + (state[0] - direction) * math.exp(-path)
         rise = state[0]
-    if parameters[3] == 0.0:
-        force = wire[YIELD_FORCE]
-    elif parameters[3] == 1.0:
-        force = 1.0
-    else:
-        force = wire[CURRENT]
     shape_of = 1.0 if kind == 3.0 else wire[HYSTERESIS]
-    wire[FORCE] += parameters[0] * force * rise * shape_of
+    wire[FORCE] += parameters[0] * multiplied(wire, parameters[3]) * rise * shape_of
 
 
 @njit(float64(float64[::1], float64[::1], float64[::1], float64), cache=True)

@@ -12,16 +12,15 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
-    CURRENT,
     DISPLACEMENT,
     FORCE,
     HYSTERESIS,
     STEP_SIGNATURE,
-    YIELD_FORCE,
     Phase,
     Step,
     change_yield_force,
 )
+from mrpipe.effects.amplitudes import multiplied
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, amplitude, shape, strength
 
 
@@ -39,12 +38,7 @@ def pinching_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
         dip = 1.0 / (1.0 + ratio * ratio)
     else:
         dip = math.exp(-abs(ratio))
-    force = wire[YIELD_FORCE]
-    if parameters[3] == 1.0:
-        force = 1.0
-    elif parameters[3] == 2.0:
-        force = wire[CURRENT]
-    wire[FORCE] -= parameters[0] * force * dip * wire[HYSTERESIS]
+    wire[FORCE] -= parameters[0] * multiplied(wire, parameters[3]) * dip * wire[HYSTERESIS]
 
 
 @njit(STEP_SIGNATURE, cache=True)

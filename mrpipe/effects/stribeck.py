@@ -10,16 +10,15 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
-    CURRENT,
     FORCE,
     HYSTERESIS,
     STEP_SIGNATURE,
     VELOCITY,
-    YIELD_FORCE,
     Phase,
     Step,
     change_yield_force,
 )
+from mrpipe.effects.amplitudes import multiplied
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
 from mrpipe.effects.profiles import FALLING, SPEED, free_profile
 
@@ -36,13 +35,7 @@ def stribeck_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
         fall = math.exp(-(ratio ** parameters[4]))
     else:
         fall = 1.0 / (1.0 + ratio * ratio)
-    if parameters[3] == 0.0:
-        force = wire[YIELD_FORCE]
-    elif parameters[3] == 1.0:
-        force = 1.0
-    else:
-        force = wire[CURRENT]
-    wire[FORCE] += parameters[0] * force * fall * wire[HYSTERESIS]
+    wire[FORCE] += parameters[0] * multiplied(wire, parameters[3]) * fall * wire[HYSTERESIS]
 
 
 @njit(STEP_SIGNATURE, cache=True)

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
-from mrpipe.simulation.several import DampersResponse
-from mrpipe.simulation.several_rig import DampersRig
+from mrpipe.simulation.several_dampers import DampersResponse
+from mrpipe.simulation.several_dampers_rig import DampersRig
 
 
 def _gains(values: Mapping[str, float]) -> str:

@@ -25,7 +25,7 @@ from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
-from mrpipe.simulation.several import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 from mrpipe.structures.over_amplitude import read_frame_at
 

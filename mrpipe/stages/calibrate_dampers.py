@@ -29,7 +29,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.dampers.model import read_tested
     from mrpipe.modal.storage import doubts_of
     from mrpipe.reporting import several_dampers as report
-    from mrpipe.simulation.several_rig import damper_model
+    from mrpipe.simulation.several_dampers_rig import damper_model
     from mrpipe.structures import read_frame
 
     settings, entries = context.settings.calibrate, context.settings.structure.dampers

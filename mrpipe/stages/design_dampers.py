@@ -19,10 +19,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import time
 
     from mrpipe.law_design.run import load_of
-    from mrpipe.law_design.several import design_as_json, design_dampers
+    from mrpipe.law_design.several_dampers import design_as_json, design_dampers
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.inputs import ground_amplitude
-    from mrpipe.simulation.several_rig import dampers_band, dampers_excitation, read_dampers_rig
+    from mrpipe.simulation.several_dampers_rig import dampers_band, dampers_excitation, read_dampers_rig
 
     began = time.perf_counter()
     settings, simulate = context.settings.design, context.settings.simulate

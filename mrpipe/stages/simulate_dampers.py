@@ -16,8 +16,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.rig import amplitude_warning
-    from mrpipe.simulation.several_rig import dampers_excitation, dampers_release, read_dampers_rig
-    from mrpipe.simulation.several_storage import response_summary, write_dampers_response
+    from mrpipe.simulation.several_dampers_rig import dampers_excitation, dampers_release, read_dampers_rig
+    from mrpipe.simulation.several_dampers_storage import response_summary, write_dampers_response
 
     settings, structure = context.settings.simulate, context.settings.structure
     if not structure.dampers:

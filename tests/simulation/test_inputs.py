@@ -17,7 +17,7 @@ from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.inputs import acting_as_forces, in_two_directions
 from mrpipe.simulation.loop import LoopOptions, Response
 from mrpipe.simulation.settings import ExcitationSettings
-from mrpipe.simulation.several import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame
 
 C_DAMPER = 900.0

@@ -17,7 +17,7 @@ from mrpipe.control.gains import Gains
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions
-from mrpipe.simulation.several import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, shear_frame
 from mrpipe.structures.given import device_position, structure_from_settings
 from mrpipe.structures.given_storage import read_matrix

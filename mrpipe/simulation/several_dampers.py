@@ -30,14 +30,14 @@ from mrpipe.dampers.drive import command_place
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.signals.discretisation import discretise_first_order
-from mrpipe.simulation import several_parts as parts
+from mrpipe.simulation import several_dampers_parts as parts
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.inputs import Inputs, inputs_of
 from mrpipe.simulation.loop import LoopOptions, Response, base_shear
 from mrpipe.simulation.sensors import add_fault, sensor_noise
-from mrpipe.simulation.several_kernel import compiled
+from mrpipe.simulation.several_dampers_kernel import compiled
 from mrpipe.structures import Frame, state_space
 
 

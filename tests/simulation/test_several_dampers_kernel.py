@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.simulation.several_kernel import _finish_step, _motion_at_start
-from mrpipe.simulation.several_parts import D_FLEXIBILITY, D_SIZE, F, Motion, Structure, V, X
+from mrpipe.simulation.several_dampers_kernel import _finish_step, _motion_at_start
+from mrpipe.simulation.several_dampers_parts import D_FLEXIBILITY, D_SIZE, F, Motion, Structure, V, X
 
 pytestmark = pytest.mark.property
 

@@ -10,10 +10,10 @@ import pytest
 
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
-from mrpipe.law_design import several
+from mrpipe.law_design import several_dampers
 from mrpipe.law_design.objective import Evaluation, Load, Objective
 from mrpipe.law_design.options import DesignSettings
-from mrpipe.law_design.several import design_as_json, design_dampers
+from mrpipe.law_design.several_dampers import design_as_json, design_dampers
 from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.simulation.windows import QUANTITIES
@@ -50,8 +50,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[Gains]:
         found = Evaluation(law, gains, (curve,), {})
         return replace(found, value=objective.value(found.peaks))
 
-    monkeypatch.setattr(several, "evaluate", evaluate)
-    monkeypatch.setattr(several, "reference_evaluation", lambda run, law, gains, load, options: evaluate(
+    monkeypatch.setattr(several_dampers, "evaluate", evaluate)
+    monkeypatch.setattr(several_dampers, "reference_evaluation", lambda run, law, gains, load, options: evaluate(
         run, law, gains, load, Objective({}), options
     ))  # fmt: skip
     return tried
@@ -82,7 +82,7 @@ def test_the_json_gives_factors_and_gains(seen: list[Gains]) -> None:
 
 def test_without_gains_the_calibration_stays(seen: list[Gains], monkeypatch: pytest.MonkeyPatch) -> None:
     rig = _rig(("below", "passive-off", Gains()))
-    monkeypatch.setattr(several, "reference_evaluation", lambda *_: Evaluation("x", Gains(), (
+    monkeypatch.setattr(several_dampers, "reference_evaluation", lambda *_: Evaluation("x", Gains(), (
         ResponseCurve(0.8, np.array([6.0]), *np.ones((2, 1, len(QUANTITIES))), np.array([True])),
     ), {}))  # fmt: skip
     found = design_dampers(rig, SETTINGS, LOAD, absolute=False, seed=1)  # type: ignore[arg-type]

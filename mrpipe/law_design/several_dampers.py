@@ -19,7 +19,7 @@ from mrpipe.law_design.search import FreeGain, simplex_search
 from mrpipe.law_design.study import COARSE, reference_evaluation
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.several_rig import DampersRig
+from mrpipe.simulation.several_dampers_rig import DampersRig
 from mrpipe.simulation.steady_state import Run
 
 TOGETHER = "dampers"

@@ -10,7 +10,7 @@ import pytest
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.errors import UserError
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
-from mrpipe.simulation.several_rig import (
+from mrpipe.simulation.several_dampers_rig import (
     DampersRig,
     controller_of,
     dampers_band,

@@ -25,7 +25,7 @@ from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.resonance import BAND
 from mrpipe.simulation.rig import loop_options
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
-from mrpipe.simulation.several import DampersResponse, LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import DampersResponse, LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, natural_modes, read_frame
 from mrpipe.structures.options import DamperSettings, StructureSettings
 

@@ -11,10 +11,10 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.artifacts.plain import plain
 from mrpipe.simulation import Excitation, harmonic
-from mrpipe.simulation.several import DampersResponse
-from mrpipe.simulation.several_rig import DampersRig
-from mrpipe.simulation.several_storage import response_summary, write_dampers_response
-from tests.simulation.test_several_rig import rig_of
+from mrpipe.simulation.several_dampers import DampersResponse
+from mrpipe.simulation.several_dampers_rig import DampersRig
+from mrpipe.simulation.several_dampers_storage import response_summary, write_dampers_response
+from tests.simulation.test_several_dampers_rig import rig_of
 
 pytestmark = pytest.mark.property
 

@@ -9,8 +9,8 @@ import numpy as np
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.indices import indices, places_table
-from mrpipe.simulation.several import DampersResponse
-from mrpipe.simulation.several_rig import DampersRig
+from mrpipe.simulation.several_dampers import DampersResponse
+from mrpipe.simulation.several_dampers_rig import DampersRig
 
 _FLOORS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "absolute_acceleration": "m/s^2"}
 _RUN = {"time_s": "s", "ground_acceleration": "m/s^2", "work_in": "J", "work_frame": "J", "energy": "J"}

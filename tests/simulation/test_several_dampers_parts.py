@@ -15,7 +15,7 @@ from mrpipe.control.kernel import (
     MEASURED_GROUND,
     MEASURED_VELOCITY,
 )
-from mrpipe.simulation.several_parts import (
+from mrpipe.simulation.several_dampers_parts import (
     D_C,
     D_CLIPPED,
     D_K,

@@ -36,7 +36,7 @@ from mrpipe.dampers.plant import (
     advance,
 )
 from mrpipe.simulation.parts import multiply, quadratic
-from mrpipe.simulation.several_parts import (
+from mrpipe.simulation.several_dampers_parts import (
     CURRENT,
     D_COMMAND,
     D_FLEXIBILITY,
@@ -325,7 +325,7 @@ def _run(
     numbers: FloatArray, layouts: IntArray, places: IntArray, memories: FloatArray, regulator: Any, members: IntArray,
     noise: FloatArray, commands: FloatArray, record: FloatArray,
 ) -> None:  # fmt: skip
-    """Run the loop; see :mod:`mrpipe.simulation.several` and :mod:`mrpipe.simulation.several_parts` for the arrays.
+    """Run the loop; the arrays are those of :mod:`mrpipe.simulation.several_dampers` and of `several_dampers_parts`.
 
     `plant` holds the first seven arrays of :class:`Structure`, and the rows of `influence`, `pull` and `direct` one
     after another, shape (3m, n). `z` is the initial state; it is overwritten by the final state.

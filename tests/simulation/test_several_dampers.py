@@ -20,7 +20,7 @@ from mrpipe.signals.discretisation import discretise_first_order
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.simulation.sensors import SensorNoise
-from mrpipe.simulation.several import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import shear_frame
 from mrpipe.structures.given import device_position
 from mrpipe.structures.response import linear_response
