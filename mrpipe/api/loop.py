@@ -65,7 +65,7 @@ class Simulated:
         return pd.DataFrame(
             {
                 "time_s": found.time_s,
-                "top_displacement_m": found.displacement[:, -1],
+                "top_displacement_m": found.displacement[:, found.top],
                 "damper_displacement_m": found.damper_displacement,
                 "force_n": found.force,
                 "desired_force_n": found.desired_force,

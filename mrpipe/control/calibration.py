@@ -122,11 +122,12 @@ class CalibrationOptions:
 
 
 def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0, **given: float) -> Weights:
-    """Return weights of energy and force that damp the target mode as much as optimal viscous damping.
+    """Return weights whose regulator damps the target mode twice as much as optimal viscous damping does.
 
-    Consider an oscillator of unit mass on which the force u acts through u_0. For the cost of its energy plus R u^2,
-    the regulator gives the damping ratio u_0/(2 omega sqrt(2 R)) if this ratio is small. R follows from the attainable
-    damping ratio, P2 (14).
+    This is the damping before the damper clips the force. Consider an oscillator of unit mass on which the force u acts
+    through u_0. For the cost e (omega^2 q^2 + q'^2) + t (phi q)^2 + R u^2, with the amplitude phi of the mode at the
+    top, the regulator gives the damping ratio u_0/(2 omega) sqrt((2 e + t phi^2/omega^2)/R) if this ratio is small. R
+    follows from the attainable damping ratio, P2 (14).
 
     Parameters
     ----------
@@ -136,9 +137,19 @@ def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0,
         Residual force of the damper [N], taken as the noise of its force.
     given
         Weights that are given, by name; they replace the computed ones.
+
+    Raises
+    ------
+    UserError
+        If energy and top displacement both have no weight.
     """
     ratio = limits.attainable_damping(modes)
-    force = given.get("energy", 1.0) * modes.u_0**2 / (8.0 * modes.omega_0**2 * ratio**2)
+    energy, top = given.get("energy", 1.0), given.get("top_displacement", 0.0)
+    if energy <= 0.0 and top <= 0.0:
+        where, key = "calibrate.regulator", "energy_weight"
+        raise UserError(where, key, "is 0, and so is top_displacement_weight", "give a positive weight to one of them")
+    weight = 2.0 * energy + top * (modes.top_0 / modes.omega_0) ** 2
+    force = weight * modes.u_0**2 / (16.0 * modes.omega_0**2 * ratio**2)
     return Weights(**{"force": force, "force_noise_n": residual_force_n, **given})
 
 
@@ -162,7 +173,7 @@ def calibrate(
     plant = plant_of(frame, position, options)
     found, skipped = {}, {}
     for law in all_laws().values() if laws is None else laws:
-        law.check(Gains(**options.overrides.get(law.name, {})))
+        law.check_given(options.overrides.get(law.name, {}))
         if not law.calibrated:
             continue
         try:

@@ -39,8 +39,8 @@ class RegulatorSettings(Section):
     force_weight: float | None = Field(
         None,
         gt=0.0,
-        description="Weight of the damper force squared [1/N2]; null: such that the regulator gives the target mode "
-        "the largest damping that viscous damping can give.",
+        description="Weight of the damper force squared [1/N2]; null: such that the regulator, before the damper clips "
+        "it, gives the target mode twice the largest damping that viscous damping can give.",
     )
     ground_noise_m_s2: float = Field(
         0.1, gt=0.0, description="Noise of the accelerometer of the ground, including model error."

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.control.following import followed_pole
 from mrpipe.control.limits import FRICTION_RATIO, LimitingModes
 from mrpipe.structures import Frame, state_space
 
-CONTINUATION_STEPS = 24
-"""Number of steps in which the device is increased from zero, in order to follow the eigenvalue of the target mode."""
+CRITICAL = 1.0 - 1e-9
+"""Damping ratio from which a mode counts as critically damped."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,11 @@ def _poles(frame: Frame, position: FloatArray, c: float, k: float) -> NDArray[np
     return np.asarray(np.linalg.eigvals(state_space(changed).A), dtype=np.complex128)
 
 
+def pole_slope(modes: LimitingModes, H: complex) -> complex:
+    """Return the first-order change of the pole i omega_0 [rad/s] by a device of complex stiffness H [N/m]."""
+    return -(modes.u_0**2) * H / (2.0 * complex(0.0, modes.omega_0))
+
+
 def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: float, k: float) -> ExactDamping:
     """Follow the eigenvalue of the target mode while the linear device f = c v + k x increases from zero.
 
@@ -63,12 +69,14 @@ def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: f
     c, k
         Viscosity [N s/m] and stiffness [N/m] of the device.
     """
-    pole = complex(0.0, modes.omega_0)
-    poles = np.zeros(0, dtype=np.complex128)
-    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1):
+
+    def upper(share: float) -> NDArray[np.complex128]:
         poles = _poles(frame, position, share * c, share * k)
-        upper = poles[poles.imag >= -1e-9]
-        pole = complex(upper[np.argmin(np.abs(upper - pole))])
+        return poles[poles.imag >= -1e-9]
+
+    start = complex(0.0, modes.omega_0)
+    pole = followed_pole(upper, start, pole_slope(modes, c * start + k))
+    poles = upper(1.0)
     worst = complex(poles[np.argmax(poles.real)])
     if worst.real > 1e-9:
         pole = worst
@@ -93,14 +101,15 @@ def exact_equivalent(frame: Frame, position: FloatArray, modes: LimitingModes, H
     A = np.zeros((2 * n, 2 * n), dtype=np.complex128)
     A[:n, n:] = np.eye(n)
     A[n:, n:] = -inverse @ frame.damping
-    pole = complex(0.0, modes.omega_0)
-    # the equivalent holds for the upper half plane only: poles below belong to its complex conjugate
-    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1):
+
+    def upper(share: float) -> NDArray[np.complex128]:
         A[n:, :n] = -inverse @ (frame.stiffness + share * H * np.outer(position, position))
-        poles = np.linalg.eigvals(A)
-        upper = poles[poles.imag > 0.0]
-        pole = complex(upper[np.argmin(np.abs(upper - pole))])
-    return ExactDamping(pole, float(np.max(upper.real)))
+        poles = np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
+        # the equivalent holds for the upper half plane only: poles below belong to its complex conjugate
+        return poles[poles.imag > 0.0]
+
+    pole = followed_pole(upper, complex(0.0, modes.omega_0), pole_slope(modes, H))
+    return ExactDamping(pole, float(np.max(upper(1.0).real)))
 
 
 def exact_friction(frame: Frame, position: FloatArray, modes: LimitingModes, alpha: float) -> ExactDamping:
@@ -127,13 +136,31 @@ class Optimum:
 
 
 def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimum:
-    """Return the gain between 0 and `largest` with the largest damping ratio, by a scan and then Brent's method."""
+    """Return the gain between 0 and `largest` with the largest damping ratio, by a scan and then Brent's method.
+
+    If the mode can be overdamped, the result is the smallest gain that damps it critically. The damping ratio is 1
+    beyond this gain too, but the mode then returns more slowly, and other modes have less damping.
+    """
     scan = np.linspace(largest / 40.0, largest, 40)
     values = [damping_ratio(float(gain)) for gain in scan]
     best = int(np.argmax(values))
-    low, high = scan[max(best - 1, 0)], scan[min(best + 1, len(scan) - 1)]
+    low, high = float(scan[best - 1]) if best else 0.0, float(scan[min(best + 1, len(scan) - 1)])
+    if values[best] >= CRITICAL:
+        critical = _first_critical(damping_ratio, low, float(scan[best]))
+        return Optimum(critical, damping_ratio(critical))
     found = minimize_scalar(lambda gain: -damping_ratio(float(gain)), bounds=(low, high), method="bounded")
     return Optimum(float(found.x), float(-found.fun))
+
+
+def _first_critical(damping_ratio: Callable[[float], float], low: float, high: float) -> float:
+    """Return the smallest gain with critical damping between `low`, which has less, and `high`, which has it."""
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if damping_ratio(middle) >= CRITICAL:
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 def damping_map(frame: Frame, position: FloatArray, modes: LimitingModes, c: FloatArray, k: FloatArray) -> FloatArray:

@@ -218,6 +218,21 @@ class Law:
             if sign is not None and value * sign < 0.0:
                 raise UserError(where, name, f"is {value:g}", f"law {self.name} needs a {_SIGNS[sign]} {name}")
 
+    def check_given(self, given: Mapping[str, float]) -> None:
+        """Check gains that a user gives, as :meth:`check` does, and that they are not all zero.
+
+        Raises
+        ------
+        UserError
+            As :meth:`check`; or if all gains of the law are given as 0, which would be no law.
+        """
+        self.check(Gains(**given))
+        if given and set(given) == set(self.gain_names) and not any(given.values()):
+            name = next(iter(given))
+            kind = _SIGNS.get(self.signs.get(name, 0.0), "non-zero")
+            remedy = f"law {self.name} needs a {kind} {name}; without force the law is passive-off"
+            raise UserError(f"calibrate.{self.name}", name, "is 0", remedy)
+
     def scaled(self, gains: Gains, factor: float) -> Gains:
         """Return the gains with the tuned gain multiplied by a factor; unchanged if the law has no tuned gain."""
         if not self.tuned_gain:

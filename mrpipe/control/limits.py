@@ -83,6 +83,9 @@ class LimitingModes:
         return (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
 
 
+SAME_FREQUENCY = 1e-6
+"""Relative difference below which two frequencies are equal: matrices in a file have about as many digits."""
+
 STILL = 1e-9
 """Ratio of the stroke of a mode to the largest stroke of all modes, below which the stroke is only a rounding error."""
 
@@ -123,6 +126,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     if not np.all(np.linalg.eigvalsh(M) > 0.0):
         raise UserError(f"frame {frame.name}", "mass", "is singular or negative", "every floor needs a positive mass")
     squared, shapes = eigh(K, M)
+    shapes = separated(w, np.sqrt(np.maximum(squared, 0.0)), shapes)
     if squared[mode - 1] <= 0.0:
         raise UserError(f"frame {frame.name}", "stiffness", f"mode {mode} is unstable", "identify the frame again")
     moving = moving_modes(w, shapes)
@@ -152,6 +156,40 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     if omega_inf - omega_0 < 1e-6 * omega_0:
         raise UserError("calibrate", "place of the damper", f"mode {mode} does not move it", "choose another place")
     return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa, frame.top)
+
+
+def equal_frequencies(angular_frequencies: FloatArray) -> list[list[int]]:
+    """Return the indices (from 0) of the modes in groups of equal frequency; most groups hold one mode."""
+    groups: list[list[int]] = []
+    for index, omega in enumerate(angular_frequencies):
+        if groups and omega - angular_frequencies[groups[-1][-1]] <= SAME_FREQUENCY * omega:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    return groups
+
+
+def separated(position: FloatArray, angular_frequencies: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Return mode shapes of which at most one in each group of equal frequency moves the damper, shape (n, n).
+
+    Every combination of modes of equal frequency is a mode. A symmetric building has such pairs, and the damper moves
+    one combination of each pair only.
+
+    Parameters
+    ----------
+    position
+        Connectivity vector w, shape (n,).
+    angular_frequencies, shapes
+        Of all modes, shape (n,) [rad/s] and (n, n), unit modal mass.
+    """
+    result = shapes.copy()
+    smallest = STILL * float(np.max(np.abs(position @ shapes)))
+    for group in equal_frequencies(angular_frequencies):
+        stroke = position @ shapes[:, group]
+        if np.count_nonzero(np.abs(stroke) > smallest) > 1:
+            first = stroke / np.linalg.norm(stroke)
+            result[:, group] = shapes[:, group] @ np.column_stack([first, null_space(first[None, :])])
+    return result
 
 
 def moving_modes(position: FloatArray, shapes: FloatArray) -> list[int]:

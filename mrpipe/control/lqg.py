@@ -79,7 +79,7 @@ def state_weight(frame: Frame, weights: Weights) -> FloatArray:
     Q = np.zeros((2 * n, 2 * n))
     Q[:n, :n] = 0.5 * weights.energy * (frame.stiffness + frame.stiffness.T)
     Q[n:, n:] = weights.energy * frame.mass
-    Q[n - 1, n - 1] += weights.top_displacement
+    Q[frame.top, frame.top] += weights.top_displacement
     return Q
 
 
@@ -107,7 +107,7 @@ def frame_observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt
     """Return the steady gain L (2n, n + 1) of the discrete Kalman predictor on [damper displacement, accelerations].
 
     The noise of the accelerometer of the ground excites the state. The accelerometers of the floors have independent
-    noise.
+    noise. Amplitudes of modes, as after a Craig-Bampton reduction, have no accelerometer; their columns are zero.
     """
     Ad, Bd, C, D = _sampled(frame, position, dt)
     W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
@@ -118,7 +118,10 @@ def frame_observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
     # an accelerometer on the floor of the damper measures the force without delay
     V += weights.force_noise_n**2 * np.diag(D[:, 1] ** 2)
-    return predictor_gain(Ad, C, W, V)
+    read = 1 + n - frame.modal_coordinates
+    L = np.zeros((2 * n, n + 1))
+    L[:, :read] = predictor_gain(Ad, np.ascontiguousarray(C[:read]), W, V[:read, :read])
+    return L
 
 
 def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -169,12 +169,11 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     calibrated = None
     gains = Gains()
     try:
+        law.check_given(damper.gains or {})
         plant = plant_of(frame, damper.position, own)
         if law.calibrated and law.name != CENTRAL_LAW:
             calibrated = calibrate_law(plant, law, own)
             gains = calibrated.gains
-        else:
-            law.check(Gains(**(damper.gains or {})))
     except UserError as error:
         # the settings of this damper are at fault, not those of the section calibrate
         key = f"gains.{error.where}" if error.source == f"calibrate.{law.name}" else error.where

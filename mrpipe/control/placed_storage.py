@@ -12,7 +12,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named, law_names
-from mrpipe.control.limits import moving_modes
+from mrpipe.control.limits import moving_modes, separated
 from mrpipe.control.lqg import Weights
 from mrpipe.control.placed import PlacedCalibration, PlacedDamper
 from mrpipe.control.storage import Calibrated, finite
@@ -75,16 +75,30 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
 
 def _first_moving(frame: Frame, position: FloatArray, target_mode: int) -> int:
     """Return the target mode or, if this mode is in the other direction, the next mode that moves the damper."""
-    moving = moving_modes(position, natural_modes(frame).mode_shapes)
+    found = natural_modes(frame)
+    moving = moving_modes(position, separated(position, found.angular_frequencies, found.mode_shapes))
     return next((mode for mode in moving if mode >= target_mode), target_mode)
 
 
 def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ...]:
-    """Return the indices (from 0) of the degrees of freedom with an accelerometer; all of them if `names` is empty."""
+    """Return the indices (from 0) of the degrees of freedom with an accelerometer; all of them if `names` is empty.
+
+    Amplitudes of modes, as after a Craig-Bampton reduction, have no place for one.
+
+    Raises
+    ------
+    UserError
+        If a name is not that of a degree of freedom, occurs twice, or is that of an amplitude.
+    """
+    placed = frame.floors - frame.modal_coordinates
     if not names:
-        return tuple(range(frame.floors))
+        return tuple(range(placed))
     where = "structure.accelerometers"
     places = tuple(degree_of_freedom(frame, name, where) for name in names)
+    amplitude = next((place for place in places if place >= placed), None)
+    if amplitude is not None:
+        remedy = f"name one of {', '.join(frame.names[:placed][:12])}, or keep more (structure.reduction.keep)"
+        raise UserError(where, frame.names[amplitude], "is the amplitude of a mode, which has no place", remedy)
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice is not None:
         raise UserError(where, frame.names[twice], "is named more than once", "name each degree of freedom once")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.control.following import followed_pole
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
+from mrpipe.control.limits import equal_frequencies
 from mrpipe.control.linearisation import clipped_linear_stiffness, equivalent_stiffness
 from mrpipe.structures import Frame, natural_modes
 
 ComplexArray = NDArray[np.complex128]
-
-CONTINUATION_STEPS = 24
-"""Number of steps in which all devices are increased from zero, in order to follow the eigenvalues of the target modes.
-"""
 
 
 @dataclass(frozen=True)
@@ -164,16 +163,36 @@ def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Seque
     modes
         Numbers of the target modes, from 1.
     """
-    omega = natural_modes(frame).angular_frequencies
-    poles = 1j * omega[np.asarray(modes, dtype=np.int64) - 1]
-    eigenvalues = poles
-    # the equivalents are valid at positive frequencies, so that only eigenvalues in the upper half plane are used
-    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1)[1:]:
-        eigenvalues = np.linalg.eigvals(loop_matrix(frame, [item.scaled(float(share)) for item in devices]))
-        upper = eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
-        poles = np.array([upper[np.argmin(np.abs(upper - pole))] for pole in poles])
-    upper = eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
-    return TogetherDamping(np.asarray(poles, dtype=np.complex128), float(np.max(upper.real)))
+    omega, slopes = natural_modes(frame).angular_frequencies, _slopes(frame, devices)
+
+    @functools.cache
+    def upper(share: float) -> ComplexArray:
+        # a device in series with its brace has an infinite eigenvalue at share 0
+        matrix = loop_matrix(frame, [item.scaled(max(share, 1e-9)) for item in devices])
+        eigenvalues = np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+        # the equivalents are valid at positive frequencies, so that only eigenvalues in the upper half plane are used
+        return eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
+
+    poles = [followed_pole(upper, complex(0.0, omega[mode - 1]), slopes[mode - 1]) for mode in modes]
+    return TogetherDamping(np.array(poles, dtype=np.complex128), float(np.max(upper(1.0).real)))
+
+
+def _slopes(frame: Frame, devices: Sequence[LinearDevice]) -> list[complex]:
+    """Return the first-order change of the pole of each mode by all devices [rad/s].
+
+    Modes of the same frequency are those combinations of their shapes that the devices do not couple.
+    """
+    found = natural_modes(frame)
+    slopes = []
+    for group in equal_frequencies(found.angular_frequencies):
+        shapes, s = found.mode_shapes[:, group], complex(0.0, found.angular_frequencies[group[0]])
+        strokes = np.array([item.position @ shapes for item in devices]).reshape(len(devices), len(group))
+        own = np.array([item.stiffness + item.equivalent + s * item.viscosity for item in devices])
+        values, vectors = np.linalg.eig(strokes.T @ (own[:, None] * strokes))
+        nearest = np.argmax(np.abs(vectors), axis=0)
+        in_order = np.argsort(nearest) if len(set(nearest)) == len(group) else np.argsort(-np.abs(values))
+        slopes += [-complex(value) / (2.0 * s) for value in values[in_order]]
+    return slopes
 
 
 def ground_response(frame: Frame, devices: Sequence[LinearDevice], omega: float) -> tuple[ComplexArray, ComplexArray]:

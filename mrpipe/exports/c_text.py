@@ -115,6 +115,7 @@ def self_test(header: str, prefix: str, vectors: Vectors, setup: Iterable[str], 
         Statements that compute `output[]` from `input[]`, both of the type of the code.
     """
     upper, inputs, outputs = prefix.upper(), vectors.input_table, vectors.output_table
+    flags = ", ".join(str(int(item.flag)) for item in vectors.outputs)
     rows = "\n".join(
         "    {{" + ", ".join(map(literal, left)) + "}, {" + ", ".join(map(literal, right)) + "}},"
         for left, right in zip(inputs.tolist(), outputs.tolist(), strict=True)
@@ -134,6 +135,8 @@ def self_test(header: str, prefix: str, vectors: Vectors, setup: Iterable[str], 
 #define ROWS {len(inputs)}
 #ifdef {upper}_SINGLE
 #define LIMIT {vectors.single_limit!r}
+/* 1 for a state, such as clipped or not, of which the share of rows that differ counts */
+static const int flag[OUTPUTS] = {{{flags}}};
 #else
 #define LIMIT {DOUBLE_LIMIT!r}
 #endif
@@ -154,7 +157,8 @@ int main(void)
             const double expected = rows[row].output[place], difference = fabs((double)output[place] - expected);
             if (fabs(expected) > largest[place]) largest[place] = fabs(expected);
 #ifdef {upper}_SINGLE
-            deviation[place] += difference * difference / ROWS;
+            /* a result that is not a number counts as a deviation */
+            deviation[place] += flag[place] ? !(difference < 0.5) / (double)ROWS : difference * difference / ROWS;
 #else
             /* a result that is not a number counts as a deviation */
             if (!(difference <= deviation[place])) deviation[place] = difference;
@@ -164,7 +168,10 @@ int main(void)
     for (int place = 0; place < OUTPUTS; ++place) {{
 #ifdef {upper}_SINGLE
         /* RMS, because rounding may move a switch by one sample */
-        deviation[place] = sqrt(deviation[place]);
+        if (flag[place])
+            largest[place] = 1.0;
+        else
+            deviation[place] = sqrt(deviation[place]);
 #endif
         const double share = deviation[place] / (largest[place] > 0.0 ? largest[place] : 1.0);
         if (!(share <= worst)) worst = share;

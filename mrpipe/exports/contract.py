@@ -30,11 +30,15 @@ class Channel:
         As in the header of vectors.csv.
     values
         Values of the channel, shape (n,).
+    flag
+        Whether the values are numbers of states, such as 0 and 1. Rounding may exchange them where the quantity that
+        they depend on is zero to rounding.
     """
 
     name: str
     unit: str
     values: FloatArray
+    flag: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,8 @@ class Vectors:
     sample_time_s
         Interval of the rows; 0 where the rows do not depend on each other.
     single_limit
-        Largest RMS deviation in single precision, over the largest magnitude of the output.
+        Largest RMS deviation in single precision, over the largest magnitude of the output; of a flag, the largest
+        share of rows that differ.
     """
 
     inputs: tuple[Channel, ...]

@@ -149,7 +149,10 @@ def controller_vectors(controller: Controller, stroke_m: float) -> Vectors:
     outputs = {place: name for name, place in _places("COMMAND_").items()}
     return Vectors(
         tuple(Channel(name, _UNITS.get(name, "m/s^2"), measured[:, place]) for place, name in sorted(inputs.items())),
-        tuple(Channel(name, _UNITS.get(name, "1"), commands[:, place]) for place, name in sorted(outputs.items())),
+        tuple(
+            Channel(name, _UNITS.get(name, "1"), commands[:, place], name in _FLAGS)
+            for place, name in sorted(outputs.items())
+        ),
         controller.sample_time_s,
         single_limit=1e-2,
     )
@@ -174,6 +177,8 @@ _UNITS = {
     "drive": "drive",
     "inverse": "drive",
 }
+
+_FLAGS = frozenset({"clipped", "switched", "fault"})
 
 
 def _header(controller: Controller, prefix: str) -> str:

@@ -44,7 +44,8 @@ def read_histories(
     ----------
     path
         PEER AT2, COSMOS or CSMIP V2, or a zip of them; else text or CSV: time [s] and one or more columns, numbers
-        divided by blanks, commas or semicolons; lines that do not begin with a number are headers.
+        divided by blanks, commas or semicolons; lines before and after them that do not begin with a number are
+        headers, and lines that begin with # or % are comments.
     unit
         Unit of the columns of a text file.
     channels
@@ -71,7 +72,7 @@ def read_histories(
         return _from_record(path, channels, channels_setting)
     table, headers = _table(path)
     _require_unit(path, headers, unit, quantity, unit_setting)
-    names = [str(number) for number in range(1, table.shape[1])]
+    names = _column_names(headers, table.shape[1])
     columns = [_place(path, item, names) + 1 for item in channels] or list(range(1, table.shape[1]))
     if not np.any(table[:, columns]):
         raise UserError(path, "", "holds nothing but zeros", "give a record that moves")
@@ -96,6 +97,16 @@ def _from_record(path: Path, channels: Sequence[str | int], channels_setting: st
     return common_window(path, chosen)
 
 
+def _column_names(headers: Sequence[str], columns: int) -> list[str]:
+    """Return the names of the columns after the time, from the first header with as many; without one the numbers."""
+    for line in headers:
+        for fields in (re.split(r"[,;\t]", line.lstrip("#% ")), line.lstrip("#% ").split()):
+            names = [re.sub(r"\s*[\[(].*", "", field).strip(" \"'") for field in fields]
+            if len(names) == columns and all(names) and len(set(names)) == columns:
+                return names[1:]
+    return [str(number) for number in range(1, columns)]
+
+
 def _place(path: Path, channel: str | int, names: Sequence[str]) -> int:
     """Return the index of a channel from its name, the number in its name (`3: 90 Deg`), or its position from 1."""
     text = str(channel).strip()
@@ -113,11 +124,17 @@ def _table(path: Path) -> tuple[FloatArray, list[str]]:
     rows: list[list[float]] = []
     headers: list[str] = []
     lines: list[int] = []
+    between: tuple[int, str] | None = None
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         words = fields_of(line)
         if not words or not (words[0][0].isdigit() or words[0][0] in "+-."):
             headers.append(line)
+            if rows and words and words[0][0] not in "#%":
+                between = between or (number, line.strip())
             continue
+        if between:
+            problem = f"is not a row of numbers ({between[1][:30]!r})"
+            raise UserError(path, f"line {between[0]}", problem, "correct the row, or mark it as a comment with #")
         try:
             row = [float(word) for word in words]
         except ValueError as error:

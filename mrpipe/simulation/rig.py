@@ -23,10 +23,11 @@ from mrpipe.simulation.acting import ADJUSTED, acting_together, harmonic_excitat
 from mrpipe.simulation.adjustment import SETTLED, adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
+from mrpipe.simulation.release import calibrated_shape, released, top_amplitude
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
-from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
+from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.structures.over_amplitude import read_frame_at
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
@@ -209,9 +210,9 @@ def expected_top(rig: Rig) -> float:
     if rig.frame.influence_y is None:
         return known.amplitude_m * abs(known.top_0 / known.u_0)
     # the calibration does not know the direction of the ground motion, and therefore not the top degree of freedom
-    modes = natural_modes(rig.frame)
-    shape = modes.mode_shapes[:, int(np.argmin(np.abs(modes.angular_frequencies - known.omega_0)))]
-    return known.amplitude_m * abs(float(shape[rig.frame.top] / (rig.position @ shape)))
+    shape = calibrated_shape(rig.frame, rig.position, known.omega_0)
+    top = top_amplitude(rig.frame, shape, "base_amplitude_m_s2")
+    return known.amplitude_m * abs(top / float(rig.position @ shape))
 
 
 def _adjusted(
@@ -261,9 +262,8 @@ def amplitude_warning(amplitude_m_s2: float) -> str:
 
 
 def release_state(rig: Rig, settings: ExcitationSettings) -> FloatArray | None:
-    """Return the initial state of a free decay: the first mode with the given top displacement, at rest."""
+    """Return the initial state of a free decay in the calibrated mode, at rest; None for other kinds of motion."""
     if settings.kind != "free-decay":
         return None
-    shape = natural_modes(rig.frame).mode_shapes[:, 0]
-    top = expected_top(rig) if settings.release_top_m is None else settings.release_top_m
-    return np.concatenate([top * shape / shape[rig.frame.top], np.zeros(rig.frame.floors)])
+    known = rig.controllers.calibrated
+    return released(rig.frame, rig.position, known.omega_0, known.amplitude_m, settings.release_top_m)

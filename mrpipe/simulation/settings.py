@@ -44,14 +44,16 @@ class SingleExcitationSettings(Section):
     )
     factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration of every kind.")
     cycles: int = Field(40, ge=2, description="Number of cycles of harmonic motion.")
-    settling_cycles: int = Field(20, ge=1, description="Number of first cycles that are left out of the indices.")
+    settling_cycles: int = Field(
+        20, ge=1, description="Number of first cycles that are left out of the indices; one cycle is kept at least."
+    )
     ramp_cycles: float = Field(2.0, ge=0.0, description="Number of cycles of the ramp at the start of harmonic motion.")
     decay_s: float = Field(8.0, ge=0.0, description="Duration of the free decay after harmonic motion stops.")
     release_top_m: float | None = Field(
         None,
         gt=0.0,
-        description="Initial top displacement of kind free-decay; null: the damper starts at the expected amplitude "
-        "of the calibration.",
+        description="Initial top displacement of kind free-decay, which begins in the mode of the calibration (of the "
+        "first damper); null: the damper starts at the expected amplitude of the calibration.",
     )
     sweep_first_hz: float | None = Field(
         None,

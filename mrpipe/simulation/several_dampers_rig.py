@@ -22,11 +22,12 @@ from mrpipe.errors import UserError
 from mrpipe.simulation.acting import ADJUSTED, acting_together, known_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions
+from mrpipe.simulation.release import released
 from mrpipe.simulation.resonance import BAND
 from mrpipe.simulation.rig import loop_options
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
 from mrpipe.simulation.several_dampers import DampersResponse, LoopDamper, simulate_dampers
-from mrpipe.structures import Frame, natural_modes, read_frame
+from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.options import DamperSettings, StructureSettings
 
 
@@ -267,22 +268,14 @@ def _amplitude(rig: DampersRig, omega: float) -> float:
 
 
 def dampers_release(rig: DampersRig, settings: ExcitationSettings) -> FloatArray | None:
-    """Return the initial state of a free decay in the first mode; None for other kinds of motion.
+    """Return the initial state of a free decay in the target mode of the first damper; None for other kinds of motion.
 
     Without `release_top_m` the first damper starts at its expected amplitude.
     """
     if settings.kind != "free-decay":
         return None
-    shape = natural_modes(rig.frame).mode_shapes[:, 0]
     known = rig.dampers[0].known.calibrated
-    stroke = float(known.position @ shape)
-    if settings.release_top_m is None and abs(stroke) < 1e-9 * float(np.max(np.abs(shape))):
-        raise UserError(
-            "simulate.excitation", "release_top_m", "the first mode does not move the first damper", "give it"
-        )
-    top = float(shape[rig.frame.top])
-    scale = known.amplitude_m / abs(stroke) if settings.release_top_m is None else settings.release_top_m / top
-    return np.concatenate([scale * shape, np.zeros(rig.frame.floors)])
+    return released(rig.frame, known.position, known.omega_0, known.amplitude_m, settings.release_top_m)
 
 
 def dampers_band(rig: DampersRig) -> tuple[float, float]:

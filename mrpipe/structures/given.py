@@ -202,8 +202,8 @@ def _matrix(key: str, entry: MatrixEntry, settings: StructureSettings, read: Rea
         values = np.asarray(content.toarray() if hasattr(content, "toarray") else content, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise UserError(file, entry.name or key, "is not a matrix of numbers", "name another variable") from error
-    if values.ndim == 1 or 1 in values.shape:
-        # lumped masses are often stored as a column
+    if values.ndim < 2 or 1 in values.shape:
+        # lumped masses are often stored as a column, and a matrix of one entry as a number
         values = np.diag(values.ravel()) if key == "mass" and values.size > 1 else np.atleast_2d(values)
     if values.ndim != 2 or values.shape[0] != values.shape[1]:
         raise UserError(file, entry.name or key, f"has the shape {values.shape}", "give a square matrix")

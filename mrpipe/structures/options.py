@@ -158,7 +158,7 @@ class StructureSettings(Section):
     accelerometers: tuple[str | int, ...] = Field(
         (),
         description="Degrees of freedom with an accelerometer that the observer of `lqg` reads, with `dampers`; "
-        "empty: all.",
+        "empty: all but amplitudes of modes.",
     )
 
     @field_validator("damping_ratio")

@@ -23,6 +23,9 @@ from mrpipe.structures.options import ReductionSettings
 WORST_CONDITION = 1e6
 """Shapes at the places to keep with a larger condition number do not determine the amplitudes of the modes."""
 
+NO_MOTION = 1e-9
+"""Response of the places over that of the whole structure below which it is a rounding error."""
+
 BEYOND_FIRST = 1.5
 """The error of a reduction is stated at least up to this multiple of the first natural frequency."""
 
@@ -225,8 +228,9 @@ def _require_stable(space: StateSpace) -> None:
 def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Sequence[int], high_hz: float) -> float:
     """Return the largest error of the response to ground motion from 0 to `high_hz`, relative to the largest response.
 
-    Of two directions of the ground the worse one counts. Where the ground moves nothing, the response is that to a
-    force on all places. The lines lie at the natural frequencies and between them, because a resonance is narrow.
+    Of two directions of the ground the worse one counts; one that does not move the places is left out. Where none
+    moves them, the response is that to a force on all places. The lines lie at the natural frequencies and between
+    them, because a resonance is narrow.
     """
     omega = natural_modes(frame).angular_frequencies
     omega = omega[(omega > 0.0) & (omega <= 2.0 * math.pi * high_hz)]
@@ -234,16 +238,25 @@ def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Seq
     lines = np.unique(np.concatenate([omega, between]))
     rows = list(places) if len(places) else list(range(frame.floors))
     directions = (frame.ground_influence, frame.influence_y)
-    loads = [-(frame.mass @ vector) for vector in directions if vector is not None and np.any(vector)]
-    if not loads:
-        loads = [np.zeros(frame.floors)]
-        loads[0][rows] = 1.0
-    errors = []
-    for load in loads:
-        full = _response(frame, lines, load)[:, rows]
-        small = (_response(reduced, lines, basis.T @ load) @ basis.T)[:, rows]
-        errors.append(float(np.max(np.abs(full - small)) / np.max(np.abs(full))))
-    return max(errors)
+    loads = [-(frame.mass @ vector) for vector in directions if vector is not None]
+    errors = [_error(frame, reduced, basis, load, rows, lines) for load in loads]
+    if all(error is None for error in errors):
+        load = np.zeros(frame.floors)
+        load[rows] = 1.0
+        errors = [_error(frame, reduced, basis, load, rows, lines)]
+    return max(error for error in errors if error is not None)
+
+
+def _error(
+    frame: Frame, reduced: Frame, basis: FloatArray, load: FloatArray, rows: list[int], lines: FloatArray
+) -> float | None:
+    """Return the largest error in the rows over the largest response there; None if the load does not move them."""
+    full = _response(frame, lines, load)
+    small = _response(reduced, lines, basis.T @ load) @ basis.T
+    size = float(np.max(np.abs(full[:, rows])))
+    if size <= NO_MOTION * float(np.max(np.abs(full))):
+        return None
+    return float(np.max(np.abs(full - small)[:, rows])) / size
 
 
 def _response(

@@ -12,11 +12,12 @@ import pytest
 
 import mrpipe
 from mrpipe.artifacts import ArtifactWriter, Provenance, load_parameter_set
+from mrpipe.control.gains import Gains
 from mrpipe.dampers.model import damper_from_parameter_set, write_damper
 from mrpipe.effects.library import damper_effects
 from mrpipe.errors import UserError
 from mrpipe.simulation.storage import write_response
-from mrpipe.structures import frame_from_parameter_set, write_frame
+from mrpipe.structures import frame_from_parameter_set, shear_frame, write_frame
 from tests.campaigns.builders import campaign, motion
 from tests.effects.test_damper import added
 
@@ -49,6 +50,15 @@ def test_a_damper_is_fitted_with_the_settings_of_its_stage(tests: mrpipe.api.Pre
     assert list(fit.to_frame()["form"]) == ["bingham"]
     with pytest.raises(UserError):
         mrpipe.fit_damper(tests, form="bouc-when")
+
+
+@pytest.mark.property
+def test_the_top_of_the_table_is_that_of_the_indices() -> None:
+    """The last degree of freedom may be a rotation, which has no displacement in metres."""
+    frame = replace(shear_frame([20.0, 20.0, 1.0], [3e4, 3e4, 1e5], 0.01), influence=np.array([1.0, 1.0, 0.0]))
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    loop = mrpipe.simulate(frame, damper, law="vd", gains=Gains(300.0))
+    assert np.array_equal(loop.to_frame()["top_displacement_m"], loop.response.displacement[:, 1])
 
 
 @pytest.mark.literature

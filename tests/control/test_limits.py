@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import (
     CalibrationOptions,
+    balanced_weights,
     calibrate,
     needed_force,
     validity_warnings,
@@ -171,6 +172,10 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
             "mass: is singular",
         ),
         (
+            lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vd": {"c_n_s_m": 0.0}})),
+            "vd: c_n_s_m: is 0; law vd needs a positive c_n_s_m",
+        ),
+        (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vdns": Gains(250.0, 4000.0)})),
             "law vdns needs a negative k_n_m",
         ),
@@ -210,3 +215,44 @@ def test_modes_across_the_damper_do_not_count() -> None:
         limits.limiting_modes(both, w, 1)
     entries = (DamperSettings(between=(4, "ground")), DamperSettings(between=(1, "ground")))
     assert [item.mode for item in placed_dampers(both, entries, 1)] == [2, 1]
+
+
+@pytest.mark.property
+def test_an_overdamped_mode_has_the_gain_of_critical_damping():
+    """Beyond this gain the damping ratio stays 1, the mode returns more slowly, and other modes are damped less."""
+    frame = shear_frame([33.0, 25.4, 8.3], [6.2e4, 4.1e4, 3.3e4], 0.0)
+    position = np.eye(3)[1]
+    modes = limits.limiting_modes(frame, position)
+
+    def answer(c):
+        return exact.exact_damping(frame, position, modes, c, 0.0)
+
+    best = exact.best_gain(lambda c: answer(c).damping_ratio, 4.0 * limits.optimal_viscosity(modes))
+    assert best.damping_ratio == pytest.approx(1.0, abs=1e-6)
+    assert answer(0.999 * best.gain).damping_ratio < 1.0
+    assert answer(1.001 * best.gain).damping_ratio == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "weights", [{}, {"energy": 0.0, "top_displacement": 1e6}, {"energy": 3.0, "top_displacement": 400.0}]
+)
+def test_the_regulator_has_twice_the_damping_of_viscous_damping(weights):
+    """Two masses, so that the damper hardly acts on mode 1 and the damping ratios are small."""
+    frame = shear_frame([40.0, 5.0], [9e3, 9e4], 0.0)
+    position = np.array([-1.0, 1.0])
+    modes = limits.limiting_modes(frame, position)
+    found = calibrate(
+        frame, position, CalibrationOptions(weights=balanced_weights(modes, **weights)), [law_named("lqg")]
+    )
+    expected = 2.0 * limits.attainable_damping(modes)
+    assert expected < 0.03
+    assert found.laws["lqg"].damping_ratio_exact == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.golden
+def test_a_regulator_without_weights_is_refused(modes):
+    with pytest.raises(
+        UserError, match=r"^calibrate\.regulator: energy_weight: is 0, and so is top_displacement_weight"
+    ):
+        balanced_weights(modes, energy=0.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from mrpipe.control.lqg import Weights, frame_observer_gain, frame_regulator_gai
 from mrpipe.errors import UserError
 from mrpipe.signals.discretisation import discretise_zero_order
 from mrpipe.structures import Frame, state_space
+from mrpipe.structures.reduction import craig_bampton
 
 control = pytest.importorskip("control")
 
@@ -68,3 +71,24 @@ def test_singular_mass_is_told(floor_one):
     frame = Frame(np.diag([1.0, 1.0, 1.0, 1.0, 0.0]), np.zeros((5, 5)), np.eye(5), "mine")
     with pytest.raises(UserError, match="frame mine: mass: is singular"):
         frame_regulator_gain(frame, floor_one, Weights())
+
+
+@pytest.mark.property
+def test_the_top_is_the_last_place_that_moves_with_the_ground(thesis_frame):
+    """Rotations and amplitudes of modes come after it, and their squares are no displacements."""
+    heavy = replace(thesis_frame, influence=np.array([1.0, 1.0, 1.0, 0.0, 0.0]))
+    reduced = craig_bampton(thesis_frame, (0, 4), 2).frame
+    for frame, top in ((thesis_frame, 4), (heavy, 2), (reduced, 1)):
+        without, weighted = (state_weight(frame, Weights(top_displacement=value)) for value in (0.0, 7.0))
+        expected = np.zeros_like(without)
+        expected[top, top] = 7.0
+        np.testing.assert_allclose(weighted - without, expected, atol=1e-9)
+
+
+@pytest.mark.property
+def test_amplitudes_of_modes_have_no_accelerometer(thesis_frame):
+    reduced = craig_bampton(thesis_frame, (0, 4), 2).frame
+    observer = lqg_observer(reduced, np.eye(4)[0], Weights(), 0.005)
+    assert np.all(observer.innovation[:, 4:] == 0.0)
+    assert np.all(np.any(observer.innovation[:, :4] != 0.0, axis=0))
+    assert np.max(np.abs(np.linalg.eigvals(observer.transition))) < 1.0

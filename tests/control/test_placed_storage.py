@@ -13,7 +13,8 @@ from mrpipe.control.calibration import CalibrationOptions
 from mrpipe.control.placed import calibrate_placed
 from mrpipe.control.placed_storage import accelerometers_of, placed_dampers, read_placed
 from mrpipe.errors import UserError
-from mrpipe.structures import natural_modes
+from mrpipe.structures import natural_modes, shear_frame
+from mrpipe.structures.reduction import craig_bampton
 from tests.control.placed import AMPLITUDE_M, FRAME, RESIDUAL_N, TWO, structure, write_artifacts
 
 pytestmark = pytest.mark.property
@@ -48,6 +49,7 @@ def test_mistakes_name_the_damper(dampers: list[dict[str, Any]], problem: str) -
         ({"law": "vd", "gains": {"k_n_m": 5.0}}, r"^structure\.dampers: damper 1: gains\.k_n_m: law vd has no such"),
         ({"law": "passive-on", "gains": {"c_n_s_m": 5.0}}, r"^structure\.dampers: damper 1: gains\.c_n_s_m: "),
         ({"law": "vd", "gains": {"c_n_s_m": -5.0}}, r"^structure\.dampers: damper 1: gains\.c_n_s_m: is -5"),
+        ({"law": "vd", "gains": {"c_n_s_m": 0.0}}, r"^structure\.dampers: damper 1: gains\.c_n_s_m: is 0; .* positive"),
         ({"law": "vd", "target_mode": 9}, r"^structure\.dampers: damper 1: target_mode: is 9; .* 1 to 2"),
     ],
 )
@@ -55,6 +57,13 @@ def test_mistakes_of_gains_and_modes_name_the_damper(damper: dict[str, Any], pro
     placed = placed_dampers(FRAME, structure({"between": (1, "ground"), **damper}).dampers, 1)
     with pytest.raises(UserError, match=problem):
         calibrate_placed(FRAME, placed, CalibrationOptions())
+
+
+def test_an_amplitude_of_a_mode_has_no_accelerometer() -> None:
+    reduced = craig_bampton(shear_frame(np.full(5, 10.0), np.full(5, 1e4), 0.01), (0, 4), 2).frame
+    assert accelerometers_of(reduced, []) == (0, 1)
+    with pytest.raises(UserError, match="mode 1: is the amplitude of a mode, which has no place; name one of floor 1"):
+        accelerometers_of(reduced, ["floor 5", "mode 1"])
 
 
 def test_accelerometers_are_counted_from_zero() -> None:

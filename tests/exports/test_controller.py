@@ -108,6 +108,30 @@ def controller_of(law: str, kind: str, frame, position, damper) -> Controller:
 
 
 @pytest.mark.oracle
+def test_a_force_that_is_zero_to_rounding_does_not_fail_the_self_test(tmp_path, set_c):
+    """In single precision fdns gives 0 in place of -1e-11 N at an extremum, and then nothing is clipped."""
+    options = ControllerOptions(
+        rate_hz=170.0, velocity="measured", friction_rounding_m_s=0.004, extremum_step_m=1e-4, drive_limit=4.0,
+        residual_force_n=20.0, low_pass_hz=None, extremum_memory_s=0.27752,
+    )  # fmt: skip
+    controller = build_controller("fdns", Gains(alpha_n_m=9000.0), options, inverse=inverse_table(set_c))
+    for name, text in controller_files(controller, "rig", {"stroke_m": 0.01}).items():
+        (tmp_path / name).write_text(text)
+    self_test(tmp_path, "controller", "RIG")
+
+
+@pytest.mark.oracle
+def test_a_wrong_flag_fails_the_self_test(tmp_path, set_c):
+    controller = build_controller("vd", Gains(650.0), ControllerOptions(drive_limit=4.0), inverse=inverse_table(set_c))
+    for name, text in controller_files(controller, "rig", {}).items():
+        changed = text.replace("command[COMMAND_SWITCHED] = ", "command[COMMAND_SWITCHED] = 1 - ")
+        (tmp_path / name).write_text(changed if name == "controller.c" else text)
+        assert name != "controller.c" or changed != text
+    with pytest.raises(AssertionError, match="largest deviation"):
+        self_test(tmp_path, "controller", "RIG")
+
+
+@pytest.mark.oracle
 @pytest.mark.parametrize(("law", "kind"), CASES)
 def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     controller = controller_of(law, kind, thesis_frame, floor_one, set_c)

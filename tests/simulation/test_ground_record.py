@@ -29,6 +29,7 @@ def test_headers_separators_and_units(tmp_path):
         ("time a\n\n0 1\n# pause\n0 2\n", "m/s^2", "line 5: time does not rise"),
         ("0 1\n1\n", "m/s^2", "line 2: has no two numbers"),
         ("a b\n", "m/s^2", "holds 0 rows"),
+        ("time a\n0 1\nn/a 1\n2 2\n", "m/s^2", r"line 3: is not a row of numbers \('n/a 1'\); correct the row"),
         ("0 1\n1 2\n", "mm", "is not a unit of acceleration"),
         ("0 1\n1 nan\n", "m/s^2", "line 2: holds a number that is not finite"),
         ("t,a\n0,0\n1,0\n2,0\n", "m/s^2", "nothing but zeros"),
@@ -98,3 +99,15 @@ def test_el_centro(public_data):
     _, histories = read_histories(path, "g")
     acceleration = histories[:, 0]
     assert np.max(np.abs(acceleration)) == pytest.approx(0.349 * 9.80665, rel=1e-2)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("header", ["time [s], roof, deck x [kN]", "% t roof deck", "wind 2026\nt;roof;deck x (kN)"])
+def test_histories_have_the_names_of_the_header(tmp_path, header):
+    path = tmp_path / "wind.csv"
+    path.write_text(f"{header}\n0.0, 0.0, 1.0\n0.02, 0.5, 2.0\n0.04, -0.25, 3.0\nend of the record\n")
+    for roof, deck in (("roof", "deck" if header.startswith("%") else "deck x"), (1, 2)):
+        _, histories = read_histories(path, "kN", channels=[deck, roof], quantity="force")
+        np.testing.assert_allclose(histories, 1e3 * np.array([[1.0, 0.0], [2.0, 0.5], [3.0, -0.25]]))
+    with pytest.raises(UserError, match="channel floor: is not in the record; it has roof, deck"):
+        read_histories(path, "kN", channels=["floor"], quantity="force")

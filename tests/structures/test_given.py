@@ -295,3 +295,11 @@ def test_the_matrix_of_a_table_without_a_header_needs_no_name(tmp_path: Path) ->
     (tmp_path / "M.csv").write_text("2,0\n0,1\n")
     with pytest.raises(UserError, match="for the whole table write name: ''"):
         read_matrix(tmp_path / "M.csv", "M")
+
+
+@pytest.mark.property
+def test_a_number_is_the_matrix_of_one_degree_of_freedom() -> None:
+    """MATLAB stores a matrix of one entry as a number."""
+    content = {"M": np.float64(2.0), "K": np.array(800.0), "C": np.array([[4.0]])}
+    frame = structure_from_settings(settings(damping=MatrixEntry(name="C")), reader(content))
+    assert (frame.mass, frame.stiffness, frame.damping) == ([[2.0]], [[800.0]], [[4.0]])

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
-from mrpipe.structures import natural_modes, read_frame, shear_frame, state_space
+from mrpipe.structures import Frame, natural_modes, read_frame, shear_frame, state_space
 from mrpipe.structures.frame import write_frame
 from mrpipe.structures.options import ReductionSettings
 from mrpipe.structures.reduction import balanced_structure, craig_bampton, guyan, modal, reduced_structure
@@ -162,3 +163,19 @@ def test_places_that_do_not_tell_modes_apart_are_refused() -> None:
 def test_places_are_kept_by_number_or_name() -> None:
     settings = ReductionSettings(method="guyan", keep=[3, "floor 6", "9", 12])
     assert reduced_structure(FRAME, settings).kept == KEPT
+
+
+@pytest.mark.property
+def test_a_direction_that_does_not_move_the_places_is_left_out() -> None:
+    """Its error is that of one rounding error over another one."""
+    influence = np.ones(12)
+    apart = replace(FRAME, influence=influence)
+    both = Frame(
+        *(block_diag(item, item) for item in (FRAME.mass, FRAME.damping, FRAME.stiffness)),
+        influence=np.concatenate([influence, 0.0 * influence]),
+        influence_y=np.concatenate([0.0 * influence, influence]),
+    )
+    assert guyan(both, KEPT, 4.0).error == pytest.approx(guyan(apart, KEPT, 4.0).error, rel=0.05)
+    # a structure that the ground does not move has the error of its response to forces
+    still = replace(both, influence=both.influence_y, influence_y=None)
+    assert 0.0 < guyan(still, KEPT, 4.0).error < 1.0

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64, int64, njit
+from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control import exact
+from mrpipe.control.following import followed_pole
 from mrpipe.control.kernel import (
     AT_OBSERVER,
     FLOORS,
@@ -19,7 +21,7 @@ from mrpipe.control.kernel import (
     WIDEST,
 )
 from mrpipe.control.law import Assessment, Plant
-from mrpipe.structures import state_space
+from mrpipe.structures import StateSpace, state_space
 
 
 @njit(float64(float64[::1], int64[::1], float64[::1], float64[::1], float64), cache=True)
@@ -88,13 +90,15 @@ def regulator_assessment(plant: Plant, gain: FloatArray) -> Assessment:
     answers = []
     for item in (plant.bare, plant.frame):
         space = state_space(item, plant.position)
-        pole = complex(0.0, plant.modes.omega_0)
-        poles = np.zeros(0, dtype=np.complex128)
-        for share in np.linspace(0.0, 1.0, exact.CONTINUATION_STEPS + 1):
-            poles = np.asarray(np.linalg.eigvals(space.A - share * np.outer(space.B[:, 1], gain)))
-            upper = poles[poles.imag >= -1e-9]
-            pole = complex(upper[np.argmin(np.abs(upper - pole))])
-        answers.append(exact.ExactDamping(pole, float(np.max(poles.real))))
+
+        def upper(share: float, space: StateSpace = space) -> NDArray[np.complex128]:
+            poles = np.asarray(np.linalg.eigvals(space.A - share * np.outer(space.B[:, 1], gain)), dtype=np.complex128)
+            return poles[poles.imag >= -1e-9]
+
+        start, shape = complex(0.0, plant.modes.omega_0), plant.modes.shape_0
+        equivalent = complex(gain @ np.concatenate([shape, start * shape])) / plant.modes.u_0
+        pole = followed_pole(upper, start, exact.pole_slope(plant.modes, equivalent))
+        answers.append(exact.ExactDamping(pole, float(np.max(upper(1.0).real))))
     without, with_frame = answers
     return Assessment(
         damping_ratio_exact=without.damping_ratio,
