@@ -110,12 +110,13 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     from mrpipe.structures import read_frame
     from mrpipe.tracing.loop import study
     from mrpipe.tracing.loop.comparison import measured_runs
+    from mrpipe.words import listed
 
     settings = context.settings.simulate
     needed = ["identify-frame", "calibrate", *(["train-inverse"] if settings.controller.inverse == "network" else [])]
     lacking = [_LACKING[name] for name in needed if name not in context.inputs]
     if lacking:
-        return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
+        return {"status": f"skipped: there is {listed([f'no {item}' for item in lacking])}"}
     context.progress(0.92, "closed loop")
     frame = read_frame(context.artifact("identify-frame"))
     damper = damper_model(traced.selection.base, traced.drive_unit)

@@ -30,6 +30,9 @@ _BY_STATE: Mapping[str, TestKind] = {
 WHETHER = "whether there is "
 """Beginning of a question about one effect; a sentence on several of them has it once."""
 
+_DRIVEN: frozenset[TestKind] = frozenset({"steps", "rest"})
+"""Kinds of test whose drive changes within the test."""
+
 _IN_DOUBT: tuple[TestKind, ...] = ("speeds", "steps", "amplitudes")
 
 
@@ -57,7 +60,7 @@ class Range:
     Attributes
     ----------
     stroke_m, speed_m_s, drive
-        Largest displacement [m], speed [m/s], and drive [A or V].
+        Largest displacement [m], speed [m/s], and drive [A or V], which is zero where no test has one.
     frequency_hz
         Usual frequency of the motion [Hz].
     duration_s
@@ -77,7 +80,9 @@ def range_of(recordings: Recordings) -> Range:
     periods = recordings.period_s[recordings.period_s > 0.0]
     frequency = 1.0 / float(np.median(periods)) if len(periods) else scales.speed / (2.0 * np.pi * scales.stroke)
     lengths = np.diff(recordings.starts) * recordings.dt
-    return Range(scales.stroke, scales.speed, scales.drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
+    # where the damper was never driven, its largest drive is not known, and it may have none
+    drive = scales.drive if np.any(recordings.drive) else 0.0
+    return Range(scales.stroke, scales.speed, drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
 
 
 def kinds_between(one: str, other: str, library: Mapping[str, Effect]) -> tuple[TestKind, ...]:
@@ -118,7 +123,9 @@ def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], reco
     tests: dict[str, list[dict[str, Any]]] = {}
     reasons: dict[str, dict[str, Any]] = {}
     for decides, kind in wanted:
-        tests.setdefault(kind, _MAKERS[kind](span))
+        if span.drive == 0.0 and kind in _DRIVEN:
+            continue
+        tests.setdefault(kind, list({item["name"]: item for item in _MAKERS[kind](span)}.values()))
         entry = reasons.setdefault(decides, {"decides": decides, "kinds": [], "tests": []})
         if kind not in entry["kinds"]:
             entry["kinds"].append(kind)
