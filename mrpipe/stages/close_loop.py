@@ -180,7 +180,7 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
     """Write the tests that would decide open questions, as settings for `record`; earlier tests stay in the list."""
-    from mrpipe.tracing.bench.campaign_tests.extra_tests import wanted_tests
+    from mrpipe.tracing.bench.campaign_tests.extra_tests import wanted_tests, with_drive_unit
 
     extra = wanted_tests(traced.summary, library, traced.training)
     listed = context.settings.laboratory.bench.tests
@@ -202,7 +202,10 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
         about = "All tests that would decide what close-loop left open have been made: longer ones, or repeats, remain."
     else:
         about = "close-loop left nothing open that another test would decide."
+    if tests and traced.drive_unit != "A":
+        about += f" The values of current_a are drives in {traced.drive_unit}."
     _write_settings(path, settings, about)
+    new = with_drive_unit(new, traced.drive_unit)
     return {"file": path.name, "tests": new, "decides": list(extra.reasons), "made_already": made}
 
 

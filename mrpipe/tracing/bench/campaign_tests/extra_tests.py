@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -131,6 +131,15 @@ def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], reco
             entry["kinds"].append(kind)
             entry["tests"] += [item["name"] for item in tests[kind]]
     return ExtraTests(tuple(item for made in tests.values() for item in made), tuple(reasons.values()))
+
+
+def with_drive_unit(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> list[dict[str, Any]]:
+    """Return tests whose largest drive is named by its unit: `current_a`, or `drive_v` for a campaign in volts.
+
+    The setting `laboratory.bench.tests`, whose form the tests have, knows `current_a` only.
+    """
+    name = "current_a" if drive_unit == "A" else f"drive_{drive_unit.lower()}"
+    return [{name if key == "current_a" else key: value for key, value in test.items()} for test in tests]
 
 
 def _test(name: str, motion: str, amplitude: float, frequency: float, duration: float, **more: Any) -> dict[str, Any]:

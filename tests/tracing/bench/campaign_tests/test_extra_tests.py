@@ -24,7 +24,7 @@ from mrpipe.laboratory.options import BenchRig
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench.campaign_tests import extra_tests
-from mrpipe.tracing.bench.campaign_tests.extra_tests import Range, kinds_between, wanted_tests
+from mrpipe.tracing.bench.campaign_tests.extra_tests import Range, kinds_between, wanted_tests, with_drive_unit
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.options import TracingOptions
@@ -67,6 +67,14 @@ def test_a_damper_that_was_never_driven_gets_no_tests_with_a_drive(monkeypatch: 
     tests = wanted_tests(asked, damper_effects(), recordings).tests  # type: ignore[arg-type]
     assert tests and all(item["current_a"] == 0.0 for item in tests)
     assert len({item["name"] for item in tests}) == len(tests)
+
+
+@pytest.mark.property
+def test_a_drive_in_volts_is_not_called_a_current() -> None:
+    """A test at 1750 V had the key `current_a` in the JSON."""
+    tests = [{"name": "extra-long", "current_a": 1750.0}]
+    assert with_drive_unit(tests, "V") == [{"name": "extra-long", "drive_v": 1750.0}]
+    assert with_drive_unit(tests, "A") == tests
 
 
 @pytest.mark.property
