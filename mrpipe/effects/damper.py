@@ -24,13 +24,15 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
         If an effect is unknown, or the file that defines it is missing.
     """
 
+    drive_unit = str(artifact.attributes(group)["drive_unit"])
+
     def effect(name: str, form: str, file: str) -> Addition:
         known = damper_effects()
         if not file and name not in known:
             raise UserError(artifact.path, f"{group}/effects", f"no effect {name!r}", "build it again with --force")
         found = load_effect_file(Path(file)) if file else known[name]
         shape = found.form(form)
-        units = {item.name: item.unit for item in shape.parameters}
+        units = {item.name: item.unit.replace("drive", drive_unit) for item in shape.parameters}
         return Addition(name, form, {}, units, found.sensor, shape.steps, file)
 
     return read_plain(artifact, group, effect=effect)

@@ -133,6 +133,11 @@ def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], reco
     return ExtraTests(tuple(item for made in tests.values() for item in made), tuple(reasons.values()))
 
 
+def _short(drive: float) -> str:
+    """Return a drive with three digits and without an exponent, for the name of a test."""
+    return f"{float(f'{drive:.3g}'):g}"
+
+
 def with_drive_unit(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> list[dict[str, Any]]:
     """Return tests whose largest drive is named by its unit: `current_a`, or `drive_v` for a campaign in volts.
 
@@ -162,7 +167,7 @@ def _speeds(span: Range) -> list[dict[str, Any]]:
     speeds = span.speed_m_s * np.geomspace(0.03, 1.5, 5)
     return [
         _test(
-            f"speed-{number}-{drive:.3g}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
+            f"speed-{number}-{_short(drive)}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
             current_a=drive,
         )
         for number, speed in enumerate(speeds, start=1)
@@ -182,7 +187,9 @@ def _steps(span: Range) -> list[dict[str, Any]]:
 
 def _positions(span: Range) -> list[dict[str, Any]]:
     return [
-        _test(f"dwell-{drive:.3g}", "dwell", span.stroke_m, span.frequency_hz, 2.0 * span.duration_s, current_a=drive)
+        _test(
+            f"dwell-{_short(drive)}", "dwell", span.stroke_m, span.frequency_hz, 2.0 * span.duration_s, current_a=drive
+        )
         for drive in (0.0, 0.5 * span.drive)
     ]
 
@@ -201,7 +208,7 @@ def _frequencies(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.5 * span.stroke_m
     highest = span.speed_m_s / (2.0 * np.pi * amplitude)
     return [
-        _test(f"frequency-{number}-{drive:.3g}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
+        _test(f"frequency-{number}-{_short(drive)}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
         for number, frequency in enumerate(highest * np.geomspace(0.15, 1.5, 4), start=1)
         for drive in (0.0, 0.5 * span.drive)
     ]
@@ -210,7 +217,7 @@ def _frequencies(span: Range) -> list[dict[str, Any]]:
 def _amplitudes(span: Range) -> list[dict[str, Any]]:
     return [
         _test(
-            f"amplitude-{share:g}-{drive:.3g}", "sine", share * span.stroke_m, span.frequency_hz, span.duration_s,
+            f"amplitude-{share:g}-{_short(drive)}", "sine", share * span.stroke_m, span.frequency_hz, span.duration_s,
             current_a=drive,
         )
         for share in (0.2, 0.5)
@@ -232,7 +239,7 @@ def _long(span: Range) -> list[dict[str, Any]]:
 
 def _reversal(span: Range) -> list[dict[str, Any]]:
     return [
-        _test(f"reversal-{drive:.3g}", "triangle", 0.2 * span.stroke_m, 0.5 * span.frequency_hz, span.duration_s,
+        _test(f"reversal-{_short(drive)}", "triangle", 0.2 * span.stroke_m, 0.5 * span.frequency_hz, span.duration_s,
               current_a=drive)
         for drive in (0.2 * span.drive, span.drive)
     ]  # fmt: skip
@@ -241,7 +248,7 @@ def _reversal(span: Range) -> list[dict[str, Any]]:
 def _constants(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.7 * span.stroke_m
     return [
-        _test(f"constant-{drive:.3g}-{factor:g}", "sine", amplitude, factor * span.frequency_hz, span.duration_s,
+        _test(f"constant-{_short(drive)}-{factor:g}", "sine", amplitude, factor * span.frequency_hz, span.duration_s,
               current_a=drive)
         for drive in (0.0, 0.3 * span.drive, 0.6 * span.drive, span.drive)
         for factor in (0.5, 1.0)
