@@ -13,6 +13,7 @@ from mrpipe.api.options import settings_of, silent
 from mrpipe.campaigns import Campaign
 from mrpipe.campaigns import load_campaign as _load_campaign
 from mrpipe.dampers.model import DamperModel
+from mrpipe.errors import UserError
 from mrpipe.fitting.comparison import Comparison, JudgedFit
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.verdict.summary import Tracing
@@ -179,14 +180,22 @@ def fit_damper(tests: PreparedTests, **settings: Any) -> DamperFit:
     Raises
     ------
     UserError
-        If a form is not known.
+        If a form is not known, or no test trains.
     """
     from mrpipe.fitting.choice import compare_and_choose
     from mrpipe.fitting.settings import IdentifyDamperSettings
 
     chosen_settings = settings_of(IdentifyDamperSettings, "identify_damper", settings)
+    _require(tests, "training")
     comparison, chosen = compare_and_choose(chosen_settings, list(tests), progress=silent)
     return DamperFit(chosen.fit.model, chosen, comparison)
+
+
+def _require(tests: Sequence[PreparedTest], *roles: str) -> None:
+    """Raise where no test has one of the roles."""
+    for role in roles:
+        if not any(test.role == role for test in tests):
+            raise UserError("tests", role, f"no {role} test", f"give at least one test the role {role}")
 
 
 @dataclass(frozen=True)
@@ -255,6 +264,11 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
         Processes.
     settings
         Settings of the section `close_loop`.
+
+    Raises
+    ------
+    UserError
+        If no test trains, or none validates.
     """
     from mrpipe.config.sections.close_loop import CloseLoopSettings
     from mrpipe.effects.library import damper_effects, effects_named, load_effect_file
@@ -263,6 +277,7 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
     from mrpipe.tracing.options import tracing_options
 
     chosen = settings_of(CloseLoopSettings, "close_loop", settings)
+    _require(tests, "training", "validation")
     known = damper_effects()
     declared = [known[name] for name in tests.campaign.declared_effects if name in known]
     traced = trace_campaign(

@@ -133,9 +133,13 @@ def open_run(directory: str | Path) -> Run:
     Raises
     ------
     UserError
-        If there is no such directory.
+        If there is no such directory, or no run has written it.
     """
     path = Path(directory)
     if not path.is_dir():
         raise UserError(path, "", "is not a run directory", "give the directory that mrpipe run printed")
+    foreign = any(path.iterdir()) and not any(path.glob("*.h5"))
+    if foreign and not (path / "manifests").is_dir():
+        problem = "is not a run directory, because it has no manifests of stages and no artifacts"
+        raise UserError(path, "", problem, "give the directory that mrpipe run printed")
     return Run(path)

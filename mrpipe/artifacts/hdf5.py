@@ -26,6 +26,7 @@ from mrpipe.artifacts.types import FloatArray
 from mrpipe.errors import UserError
 
 SCHEMA = "mrpipe-artifact-1"
+_OLDER = f"{SCHEMA!r} expected: another program or version wrote the file; build it again with --force"
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Artifact:
         except (OSError, RuntimeError, KeyError) as error:
             raise UserError(self.path, "", "not a readable HDF5 file", "build it again with --force") from error
         if self.root.get("schema") != SCHEMA:
-            raise UserError(self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected")
+            raise UserError(self.path, "attribute schema", f"is {self.root.get('schema')!r}", _OLDER)
 
     @property
     def stage(self) -> str:

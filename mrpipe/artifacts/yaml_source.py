@@ -32,6 +32,8 @@ LARGEST_BYTES = 20_000_000
 """Largest file."""
 
 _LONGEST_SHOWN = 80
+_TYPES = {"str", "int", "float", "bool"}
+"""Names by which pydantic distinguishes the types of a value that may have several."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -96,13 +98,20 @@ class YamlSource:
             return model.model_validate({str(key): value for key, value in content.items()})
         except ValidationError as error:
             first = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")[0]
-            key = (*place, *(part for part in first["loc"] if part != "[key]"))
+            key = (*place, *_keys(model, first["loc"]))
             if first["type"] == "extra_forbidden":
                 known = _model_at(model, first["loc"][:-1]).model_fields
                 raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), known)) from None
             if first["type"] == "missing":
                 raise self.error(key, "is missing", f"write {first['loc'][-1]}: ... here") from None
             raise self.error(key, f"is {shown(first['input'])}", expected(first)) from None
+
+
+def _keys(model: type[BaseModel], place: Place) -> tuple[str | int, ...]:
+    """Return the keys of a fault as the user writes them, without the names of the types that a value may have."""
+    keys = tuple(part for part in place if part != "[key]")
+    of_union = len(keys) > 1 and keys[-1] in _TYPES and keys[-1] not in _model_at(model, keys[:-2]).model_fields
+    return keys[:-1] if of_union else keys
 
 
 def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel]:
@@ -139,7 +148,7 @@ def expected(fault: Mapping[str, Any]) -> str:
         "int_parsing": "a whole number expected",
         "int_type": "a whole number expected",
         "int_from_float": "a whole number expected",
-        "string_type": "a text expected; put it in quotes",
+        "string_type": "a text expected" + ("" if isinstance(fault["input"], list | dict) else "; put it in quotes"),
         "bool_parsing": "true or false expected",
         "bool_type": "true or false expected",
         "dict_type": "a mapping of keys to values expected",

@@ -10,6 +10,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 LARGEST_SAMPLE = 1e30
 """Largest plausible sample [SI]; larger numbers are not measurements of any quantity."""
@@ -45,7 +46,7 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
         raise UserError(
             file.path,
             f"{where}, {channel}, row {row}",
-            f"is {kind}, {bad.size} such samples in all",
+            f"is {kind}, {counted(bad.size, 'such sample')} in all",
             "leave them out with segments_s, or correct the file",
         )
 

@@ -104,6 +104,9 @@ _POSITIONAL = Annotated[
     Path | None, typer.Argument(metavar="CONFIG", help="Configuration; the same as --config FILE.", show_default=False)
 ]
 
+_CONFIGURATIONS = {".yaml", ".yml"}
+"""Endings of configuration files."""
+
 
 def one_config(named: Path | None, positional: Path | None) -> Path | None:
     """Return the configuration that was given with or without `--config`.
@@ -111,7 +114,7 @@ def one_config(named: Path | None, positional: Path | None) -> Path | None:
     Raises
     ------
     UserError
-        If two different ones were given, or the file is a campaign.
+        If two different ones were given, or the file is a campaign or no YAML file.
     """
     from mrpipe.campaigns.model import CAMPAIGN_FILE
 
@@ -121,6 +124,9 @@ def one_config(named: Path | None, positional: Path | None) -> Path | None:
     if chosen is not None and (chosen.name == CAMPAIGN_FILE or (chosen / CAMPAIGN_FILE).is_file()):
         folder = chosen.parent if chosen.name == CAMPAIGN_FILE else chosen
         raise UserError(chosen, "", "is a campaign and not a configuration", f"use --campaign {folder}")
+    if chosen is not None and chosen.is_file() and chosen.suffix.lower() not in _CONFIGURATIONS:
+        problem = "is not a configuration, because it does not end in .yaml"
+        raise UserError(chosen, "", problem, "name a YAML file, such as configs/my-rig.yaml")
     return chosen
 
 

@@ -194,6 +194,11 @@ def _require_run(directory: Path) -> None:
         raise UserError(directory, "", problem, "name a directory that `mrpipe run` wrote, such as runs/my-rig")
 
 
+def _is_new(directory: Path) -> bool:
+    """Return whether a directory is there and holds nothing yet."""
+    return directory.is_dir() and not any(directory.iterdir())
+
+
 def _run_or_config(options: CommonOptions, given: Path | None) -> CommonOptions:
     """Take a positional argument as the run directory, or as the configuration where it is a YAML file."""
     from dataclasses import replace
@@ -228,8 +233,8 @@ def status(
     from mrpipe.cli.session import load, pipeline_of
 
     options = _run_or_config(options, directory)
-    if options.run is not None and not options.run.is_dir():
-        raise UserError(options.run, "", "no such run directory", "run `mrpipe run` first")
+    if options.run is not None and not (_is_new(options.run) or (options.run / "config.yaml").is_file()):
+        _require_run(options.run)
     loaded = load(_config_of_run(options))
     pipeline = pipeline_of(options, loaded, to_log=False)
     found = pipeline.status([name for name in loaded.config.stages if name != "report"])

@@ -188,6 +188,16 @@ def record(
     build_and_print([f"record-{name}" for name in rigs], options)
 
 
+def _with_damper(options: CommonOptions, damper: str) -> CommonOptions:
+    """Return the options with the damper of --damper; one that is not there is refused before any stage is built."""
+    from dataclasses import replace
+
+    from mrpipe.effects.damper import require_damper
+
+    require_damper(damper)
+    return replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
+
+
 def _several_dampers(options: CommonOptions) -> bool:
     """Return whether the configuration gives the dampers of the structure one by one."""
     from mrpipe.cli.session import load
@@ -238,7 +248,7 @@ def simulate(
     if law != "all" and law not in known:
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
     if damper is not None:
-        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
+        options = _with_damper(options, damper)
     if gains is not None:
         options = replace(options, overrides=[*options.overrides, f"gains.source={gains}"])
     laws = known if law == "all" else (law,)
@@ -259,7 +269,6 @@ def design(
     ] = None,
 ) -> None:
     """Find the best law and gains; the help text is that of the stage."""
-    from dataclasses import replace
 
     if damper is not None:
         if _several_dampers(options):
@@ -269,7 +278,7 @@ def design(
                 "does not suit the configuration, because each damper of structure.dampers has its own model",
                 "leave the option out",
             )
-        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
+        options = _with_damper(options, damper)
     build_and_print(["design"], options)
 
 
@@ -323,7 +332,8 @@ def export(
     for name in formats or ():
         if name not in _FORMATS:
             raise UserError("--format", name, "is not a format", nearest(name, _FORMATS))
-    given = {"simulate.damper": damper, "gains.source": gains}
+    options = options if damper is None else _with_damper(options, damper)
+    given = {"gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
     if formats:
         overrides.append(f"export.formats=[{', '.join(formats)}]")

@@ -140,9 +140,9 @@ class DamperModel:
     def force(
         self,
         displacement: FloatArray,
-        velocity: FloatArray,
-        acceleration: FloatArray,
-        drive: FloatArray,
+        velocity: FloatArray | float,
+        acceleration: FloatArray | float,
+        drive: FloatArray | float,
         dt: float,
     ) -> FloatArray:
         """Return the force [N], shape (n,), for a recorded motion.
@@ -150,11 +150,17 @@ class DamperModel:
         Parameters
         ----------
         displacement, velocity, acceleration, drive
-            Shape (n,); m, m/s, m/s^2, A or V.
+            Shape (n,), or a number for a constant; m, m/s, m/s^2, A or V.
         dt
             Sampling interval [s].
+
+        Raises
+        ------
+        UserError
+            If the lengths differ, or the interval is not positive.
         """
-        return run_chain(self.chain(), displacement, velocity, acceleration, drive, dt)[:, FORCE]
+        given = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration, "drive": drive}
+        return run_chain(self.chain(), *_of_one_length(given), _positive(dt))[:, FORCE]
 
     def quasi_static_force(self, velocity: FloatArray | float, drive: FloatArray | float) -> FloatArray:
         """Return the post-yield force [N]: the hysteresis has yielded in the direction of motion, and there is no lag.
@@ -174,6 +180,25 @@ class DamperModel:
     def unit(self, name: str) -> str:
         """Return the SI unit of a parameter."""
         return parameter_unit(name, self.drive_unit, self.base)
+
+
+def _of_one_length(given: Mapping[str, FloatArray | float]) -> list[FloatArray]:
+    """Return signals of shape (n,); the compiled loop does not check lengths and would read beyond the end of one."""
+    arrays = {name: np.asarray(values, dtype=np.float64) for name, values in given.items()}
+    count = max(array.size for array in arrays.values())
+    for name, array in arrays.items():
+        if array.ndim and array.shape != (count,):
+            problem = f"has the shape {array.shape}, another signal has {count} samples"
+            raise UserError(
+                "force", name, problem, f"give an array of the shape ({count},), or a number for a constant"
+            )
+    return [array if array.ndim else np.full(count, float(array)) for array in arrays.values()]
+
+
+def _positive(dt: float) -> float:
+    if not 0.0 < dt < math.inf:
+        raise UserError("force", "dt", f"is {dt:g}", "a sampling interval above 0 s expected")
+    return dt
 
 
 def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> str:

@@ -11,6 +11,9 @@ from mrpipe.dampers.model import read_damper as read_plain
 from mrpipe.effects.library import damper_effects, load_effect_file
 from mrpipe.errors import UserError
 
+DAMPERS_OF_A_RUN = ("identified", "traced")
+"""Names of the dampers that the stages of a run build."""
+
 
 def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
     """Read a damper with its effects.
@@ -21,13 +24,15 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
         If an effect is unknown, or the file that defines it is missing.
     """
 
+    drive_unit = str(artifact.attributes(group)["drive_unit"])
+
     def effect(name: str, form: str, file: str) -> Addition:
         known = damper_effects()
         if not file and name not in known:
             raise UserError(artifact.path, f"{group}/effects", f"no effect {name!r}", "build it again with --force")
         found = load_effect_file(Path(file)) if file else known[name]
         shape = found.form(form)
-        units = {item.name: item.unit for item in shape.parameters}
+        units = {item.name: item.unit.replace("drive", drive_unit) for item in shape.parameters}
         return Addition(name, form, {}, units, found.sensor, shape.steps, file)
 
     return read_plain(artifact, group, effect=effect)
@@ -60,3 +65,30 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
             raise UserError(path, "damper", "no such artifact", remedy)
         return read_damper(Artifact(Path(name)))
     return damper_from_parameter_set(load_parameter_set("dampers", name))
+
+
+def require_damper(name: str) -> None:
+    """Refuse a damper of the option `--damper` that is not there, before stages are built for it.
+
+    Parameters
+    ----------
+    name
+        As in :func:`damper_named`. The dampers of a run are built by its stages.
+
+    Raises
+    ------
+    UserError
+        If there is no such artifact and no such parameter set.
+    """
+    if name in DAMPERS_OF_A_RUN:
+        return
+    if name.endswith(".h5"):
+        damper_named(name, {})
+        return
+    try:
+        load_parameter_set("dampers", name)
+    except UserError as error:
+        if "no such parameter set" not in error.problem:
+            raise
+        known = f"{', '.join(DAMPERS_OF_A_RUN)}, a file, or one of the {error.remedy}"
+        raise UserError("--damper", name, "no such damper", known) from None

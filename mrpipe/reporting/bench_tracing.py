@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
-from mrpipe.reporting.traced_words import exchange_in_words, numbers_of
+from mrpipe.reporting.traced_words import exchange_in_words, numbers_of, unproven_in_words
 from mrpipe.words import listed
 
 AFTER = COLOURS[0]
@@ -178,9 +178,11 @@ def errors_per_test(rows: Sequence[Mapping[str, Any]], noise_floor: float) -> Fi
     axis.scatter(after, place, s=22, color=AFTER, label="after", zorder=2)
     axis.axvline(100.0 * noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
     axis.set_yticks(place, [row["name"] for row in shown], fontsize=7)
+    # room below for the legend, so that it hides no test, and above for the first one
+    axis.set_ylim(place[-1] - 0.5 - 1.3 * len(shown) / max(len(shown), 6), place[0] + 0.5)
     axis.set_xlim(left=0.0)
     axis.grid(axis="y", visible=False)
-    axis.legend(fontsize=8, loc="lower right")
+    axis.legend(fontsize=8, loc="lower right", ncols=3)
     label(axis, "RMS error over RMS value [%]", "")
     return figure
 
@@ -222,7 +224,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         depends = f" It varies with {listed(states)}." if states else ""
         form = f" {exchange}" if exchange else ""
         reached = f" The error is then {_percent(after)}." if form and not flexible else ""
-        unproven = _unproven_in_words(summary.get("further_terms", []))
+        unproven = _after_a_blank(unproven_in_words(summary.get("further_terms", [])))
         return (
             f"{start} Something is missing, but no known effect explains it.{form}{unproven}{reached}{depends}{added}"
         )
@@ -233,7 +235,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if len(effects) > 1:
         recovers = recovers.replace("recovers", "recover", 1)
     end = f"{added_up} {recovers}." if flexible else f"{added_up} {recovers}; the error is then {_percent(after)}."
-    end += _unproven_in_words(summary.get("further_terms", []))
+    end += _after_a_blank(unproven_in_words(summary.get("further_terms", [])))
     if summary["unexplained"]["structured"]:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         end += f" Something is still unexplained{'; it varies with ' + listed(states) if states else ''}."
@@ -259,17 +261,8 @@ def _difference_in_words(found: Mapping[str, Any]) -> str:
     return text
 
 
-def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
-    if not terms:
-        return ""
-    names = listed([f"{item['name']} ({item['form']}, probability {item['confidence']:.2f})" for item in terms])
-    rest = (
-        "lowers the error and is part of the model, but is not proven"
-        if len(terms) == 1
-        else ("lower the error and are part of the model, but are not proven")
-    )
-    rivals = sorted({name for item in terms for name in item["tied_with"]})
-    return f" In addition, {names} {rest}{f' against {listed(rivals)}' if rivals else ''}."
+def _after_a_blank(text: str) -> str:
+    return f" {text}" if text else ""
 
 
 def _effect_in_words(effect: Mapping[str, Any]) -> str:

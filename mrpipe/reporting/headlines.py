@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mrpipe.reporting.traced_words import exchanged_form, numbers_of
+from mrpipe.reporting.words import percent
 from mrpipe.words import counted, duration, listed
 
 
@@ -103,10 +104,12 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     differs = "the validation tests differ from the training tests"
     form = exchanged_form(summary)
     exchanged = f" with the base form {form} in place of {summary.get('model', '')}" if form else ""
+    left = f"what the base form {form} leaves" if form else "the residual"
     verdict = (
         (f"{found}{exchanged}" if found else "")
         or (differs if summary.get("verdict_class") == "validation differs" else "")
-        or ("no known effect explains the residual" if unexplained else "nothing is missing")
+        or (f"no known effect explains {left}" if unexplained else "")
+        or (f"no effect is missing{exchanged}" if form else "nothing is missing")
     )
     floor = _number(summary.get("noise_floor_nrmse"))
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
@@ -187,7 +190,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     if unexplained["structured"]:
         states = ", ".join(item["state"] for item in unexplained["depends_on"][:3])
         lines.append(
-            f"still unexplained: {100.0 * unexplained['share_of_residual']:.0f} % of the residual"
+            f"still unexplained: {percent(unexplained['share_of_residual'])} of the squared residual"
             f"{', varying with ' + states if states else ''}"
         )
     if summary.get("corrections", {}).get("found"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mrpipe.words import listed
@@ -63,3 +63,17 @@ def exchange_in_words(summary: Mapping[str, Any]) -> str:
         f"The final model has the base form **{taken}** in place of {found.get('declared')}, because it lowers the "
         f"error.{as_good}"
     )
+
+
+def unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
+    """Return a sentence on the terms that are part of the model without being proven; empty without any."""
+    if not terms:
+        return ""
+    names = listed([f"{item['name']} ({item['form']}, probability {item['confidence']:.2f})" for item in terms])
+    rest = (
+        "lowers the error and is part of the model, but is not proven"
+        if len(terms) == 1
+        else ("lower the error and are part of the model, but are not proven")
+    )
+    rivals = sorted({name for item in terms for name in item["tied_with"]})
+    return f"In addition, {names} {rest}{f' against {listed(rivals)}' if rivals else ''}."

@@ -9,6 +9,7 @@ from mrpipe.networks.network import Network
 from mrpipe.networks.training import Trained
 from mrpipe.reporting import networks as figures
 from mrpipe.reporting.sink import Sink
+from mrpipe.words import counted
 
 
 def describe(sink: Sink, trained: Trained, judged: Judgement, unit: str, span: float | None = None) -> None:
@@ -30,7 +31,8 @@ def describe(sink: Sink, trained: Trained, judged: Judgement, unit: str, span: f
     sink.text(
         f"Network {network.architecture} with {network.parameters} parameters "
         f"({'with' if network.has_biases else 'without'} biases): {_taken(network)} of {len(trained.starts)} starts, "
-        f"judged on {len(trained.held_out)} training records that were held out. Error on the validation tests: "
+        f"judged on {counted(len(trained.held_out), 'training record')} that {_were(len(trained.held_out))} held out. "
+        "Error on the validation tests: "
         f"{size}; a linear model of the same inputs: {rival}."
     )
     if spread:
@@ -59,6 +61,10 @@ def _starts(trained: Trained) -> pd.DataFrame:
     ]
     # after a second phase that learned the held-out records there is no held-out error
     return pd.DataFrame(rows).dropna(axis="columns", how="all")
+
+
+def _were(count: int) -> str:
+    return "was" if count == 1 else "were"
 
 
 def _taken(network: Network) -> str:

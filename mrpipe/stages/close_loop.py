@@ -110,12 +110,13 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     from mrpipe.structures import read_frame
     from mrpipe.tracing.loop import study
     from mrpipe.tracing.loop.comparison import measured_runs
+    from mrpipe.words import listed
 
     settings = context.settings.simulate
     needed = ["identify-frame", "calibrate", *(["train-inverse"] if settings.controller.inverse == "network" else [])]
     lacking = [_LACKING[name] for name in needed if name not in context.inputs]
     if lacking:
-        return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
+        return {"status": f"skipped: there is {listed([f'no {item}' for item in lacking])}"}
     context.progress(0.92, "closed loop")
     frame = read_frame(context.artifact("identify-frame"))
     damper = damper_model(traced.selection.base, traced.drive_unit)
@@ -179,7 +180,7 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
     """Write the tests that would decide open questions, as settings for `record`; earlier tests stay in the list."""
-    from mrpipe.tracing.bench.campaign_tests.extra_tests import wanted_tests
+    from mrpipe.tracing.bench.campaign_tests.extra_tests import wanted_tests, with_drive_unit
 
     extra = wanted_tests(traced.summary, library, traced.training)
     listed = context.settings.laboratory.bench.tests
@@ -201,7 +202,10 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
         about = "All tests that would decide what close-loop left open have been made: longer ones, or repeats, remain."
     else:
         about = "close-loop left nothing open that another test would decide."
+    if tests and traced.drive_unit != "A":
+        about += f" The values of current_a are drives in {traced.drive_unit}."
     _write_settings(path, settings, about)
+    new = with_drive_unit(new, traced.drive_unit)
     return {"file": path.name, "tests": new, "decides": list(extra.reasons), "made_already": made}
 
 

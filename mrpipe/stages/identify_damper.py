@@ -31,7 +31,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     comparison, chosen = compare_and_choose(settings, tests, jobs=context.jobs, progress=context.progress)
     for line in findings(chosen.fit):
         context.warn(line)
-    summary = _summary(comparison, chosen, settings.reference_A)
+    without_drive = not any(test.drive.any() for test in tests)
+    summary = _summary(comparison, chosen, settings.reference_A, without_drive)
     largest = {
         "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
         "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
@@ -41,7 +42,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return summary
 
 
-def _summary(comparison: Comparison, chosen: JudgedFit, reference: float) -> dict[str, Any]:
+def _summary(comparison: Comparison, chosen: JudgedFit, reference: float, without_drive: bool) -> dict[str, Any]:
     from mrpipe.fitting.comparison import reason_of_choice
     from mrpipe.fitting.summary import (
         comparison_rows,
@@ -61,6 +62,7 @@ def _summary(comparison: Comparison, chosen: JudgedFit, reference: float) -> dic
         "reason": reason_of_choice(chosen, comparison.judged),
         "drive_unit": model.drive_unit,
         "drive_limit": model.drive_limit,
+        "without_drive": without_drive,
         "drive_law": law_summary(comparison, chosen),
         "parameters": parameter_table(chosen.fit),
         "thesis_parameters": thesis_table(chosen.fit, reference),

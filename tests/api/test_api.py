@@ -85,6 +85,17 @@ def test_a_run_is_opened_by_its_directory(tmp_path: Path) -> None:
     assert "no artifacts" in str(run)
     with pytest.raises(UserError, match=r"damper\.h5"):
         _ = run.damper
+    (tmp_path / "a.csv").write_text("1,2\n")
+    with pytest.raises(UserError, match="no manifests of stages and no artifacts"):
+        mrpipe.open_run(tmp_path)
+
+
+@pytest.mark.property
+def test_tests_without_a_role_are_refused() -> None:
+    """An empty list had ended with `list index out of range`."""
+    for call in (mrpipe.fit_damper, mrpipe.trace):
+        with pytest.raises(UserError, match="no training test"):
+            call([])  # type: ignore[operator]
 
 
 @pytest.mark.property

@@ -109,3 +109,18 @@ def test_names_that_look_like_octal_numbers_or_times_stay_names(tmp_path: Path) 
     )
     found = read_yaml(tmp_path / "a.yaml").content
     assert found == {"a": "0123", "b": "1:30", "c": 0, "d": -12, "e": 31, "f": 1.5e-3, "g": -0.5, "h": 1000}
+
+
+@pytest.mark.golden
+def test_a_value_of_several_types_is_named_by_its_key(tmp_path: Path) -> None:
+    """The key had the name of a type behind it: `column.str`."""
+
+    class Channel(BaseModel):
+        model_config = ConfigDict(strict=True)
+        column: str | int
+
+    (tmp_path / "a.yaml").write_text("column: [F]\n", encoding="utf-8")
+    source = read_yaml(tmp_path / "a.yaml")
+    with pytest.raises(UserError) as caught:
+        source.build(Channel, source.content, ())
+    assert str(caught.value).endswith("a.yaml: line 1, column: is ['F']; a text expected")

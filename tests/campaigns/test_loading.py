@@ -188,7 +188,7 @@ def test_a_missing_role_is_told(tmp_path: Path, role: str) -> None:
 @pytest.mark.parametrize(
     ("column", "value", "expected"),
     [
-        ("F", np.nan, "test one, force, row 1236: is NaN (no number), 1 such samples in all"),
+        ("F", np.nan, "test one, force, row 1236: is NaN (no number), 1 such sample in all"),
         ("x", np.inf, "test one, displacement, row 1236: is infinite"),
         ("t", 0.5, "test one, row 1236: time goes from 1.233 to 0.5 s; a clock that increases"),
         ("t", np.nan, "test one, row 1236: time is nan"),

@@ -50,6 +50,10 @@ MISTAKES = {
     "no command at all": (["xyzzy"], "No such command 'xyzzy'. `mrpipe help` lists the commands."),
     "unknown option": (["prepare", "--cofnig", "x"], "No such option"),
     "missing config": (["run", "nowhere.yaml"], "nowhere.yaml: no such configuration"),
+    "data file as config": (
+        ["run", "README.md"],
+        "README.md: is not a configuration, because it does not end in .yaml",
+    ),
     "unknown setting": (["prepare", "--set", "prepare.cutof_hz=3"], "did you mean cutoff_hz?"),
     "unknown effect": (["check", "--set", "close_loop.candidates=[remanance]"], "did you mean remanence?"),
     "settings file missing": (["prepare", "--settings", "no.yaml"], "--settings: no.yaml: no such file"),
@@ -72,6 +76,16 @@ MISTAKES = {
     "no run to report": (["report", "nowhere"], "no such run directory"),
     "no run in a directory": (["report", "tests"], "tests: is not a run directory, because it has no manifests"),
     "no run for status": (["status", "nowhere"], "no such run directory"),
+    "no run in a directory, status": (
+        ["status", "tests"],
+        "tests: is not a run directory, because it has no manifests",
+    ),
+    "no such damper": (
+        ["simulate", "--law", "vd", "--damper", "trased"],
+        "--damper: trased: no such damper; identified, traced, a file, or one of the known sets: ",
+    ),
+    "no such damper to design": (["design", "--damper", "trased"], "--damper: trased: no such damper"),
+    "no such damper to export": (["export", "damper", "--damper", "x.h5"], "no such artifact"),
     "negative jobs": (["prepare", "--jobs", "0"], "--jobs"),
 }
 

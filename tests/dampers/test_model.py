@@ -169,3 +169,20 @@ def test_forms_that_round_agree_with_their_post_yield_force():
     for model in models:
         force = model.force(0.05 * times, 0 * times + 0.05, 0 * times, 0 * times + 1.5, 1e-3)
         assert force[-1] == pytest.approx(float(model.quasi_static_force(0.05, 1.5)), rel=1e-6)
+
+
+@pytest.mark.property
+def test_signals_of_other_lengths_are_refused_and_numbers_are_constants() -> None:
+    """The compiled loop had read beyond the end of the shorter one: arbitrary forces, or NaN for a number."""
+    model = damper("set-c")
+    times = np.arange(0.0, 1.0, 1e-3)
+    x, v = 0.01 * np.sin(6.0 * times), 0.06 * np.cos(6.0 * times)
+    full = model.force(x, v, np.zeros_like(x), np.full_like(x, 2.0), 1e-3)
+    np.testing.assert_array_equal(model.force(x, v, 0.0, 2.0, 1e-3), full)
+    with pytest.raises(UserError, match=r"force: drive: has the shape \(999,\), another signal has 1000 samples"):
+        model.force(x, v, np.zeros_like(x), np.full(999, 2.0), 1e-3)
+    with pytest.raises(UserError, match="force: displacement: has the shape"):
+        model.force(x[:5], v, np.zeros_like(x), 2.0, 1e-3)
+    for dt in (0.0, -1e-3, float("nan")):
+        with pytest.raises(UserError, match="a sampling interval above 0 s expected"):
+            model.force(x, v, np.zeros_like(x), 2.0, dt)

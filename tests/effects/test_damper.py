@@ -48,6 +48,16 @@ def test_an_effect_adds_its_force() -> None:
     np.testing.assert_allclose(damper().force(x, v, a, u, 1e-3) - plain.force(x, v, a, u, 1e-3), 1.5 * a, atol=1e-9)
 
 
+@pytest.mark.golden
+@pytest.mark.parametrize("unit", ["A", "V"])
+def test_units_of_effects_name_the_drive_of_the_damper(tmp_path: Path, unit: str) -> None:
+    """The report and the exported JSON had `N/drive` for the friction rate of a damper in volts."""
+    friction = added("stribeck", "own-friction", friction=1.0, friction_rate=2.0)
+    model = DamperModel("bouc-wen", BASE, unit, drive_limit=2.0, effects=(friction,))
+    (effect,) = read_damper(write(model, tmp_path / "damper-traced.h5")).effects
+    assert effect.units["friction_rate"] == f"N/{unit}"
+
+
 @pytest.mark.property
 def test_it_survives_its_artifact(tmp_path: Path) -> None:
     model = damper()

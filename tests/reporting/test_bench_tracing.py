@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib.pyplot as plt
 import pytest
 
-from mrpipe.reporting.bench_tracing import in_plain_words
+from mrpipe.reporting.bench_tracing import errors_per_test, in_plain_words
 
 pytestmark = pytest.mark.property
 
@@ -80,3 +81,19 @@ def test_a_base_model_that_fails_is_said_to_fail(summary: dict[str, Any]) -> Non
 def test_an_exchanged_base_form_is_part_of_the_paragraph(summary: dict[str, Any]) -> None:
     summary["base_form"] = {"declared": "bouc-wen", "taken": "rounded-yield", "tied_with": []}
     assert "base form **rounded-yield** in place of bouc-wen" in in_plain_words(summary)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("count", [1, 2, 6, 24])
+def test_the_legend_hides_no_test_and_the_first_one_is_whole(count: int) -> None:
+    rows = [{"name": f"t{index}", "nrmse_before": 0.1 - 0.001 * index, "nrmse_after": 0.01} for index in range(count)]
+    figure = errors_per_test(rows, 0.004)
+    figure.canvas.draw()
+    axis = figure.axes[0]
+    low, high = axis.get_ylim()
+    assert low <= -0.5 and high >= count - 0.5
+    legend = axis.get_legend()
+    assert legend is not None
+    box = legend.get_window_extent().transformed(axis.transData.inverted())
+    assert box.y1 < 0.0  # the last test stands at 0
+    plt.close(figure)

@@ -18,7 +18,7 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
-from mrpipe.reporting.traced_words import exchange_in_words
+from mrpipe.reporting.traced_words import exchange_in_words, unproven_in_words
 from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed
@@ -112,8 +112,7 @@ def damper(facts: RunFacts) -> Section:
     if "parameters" in summary:
         section.text(
             f"Model {summary['form']}: error {percent(summary['validation_nrmse'])} on the validation tests, "
-            f"{percent(summary['training_nrmse'])} on the training tests; drive up to "
-            f"{quantity(summary['drive_limit'], summary['drive_unit'])}."
+            f"{percent(summary['training_nrmse'])} on the training tests; {_largest_drive(summary)}."
         )
         section.table("parameters", tables.parameters(summary["parameters"]), "Parameters with standard errors (SI).")
     if _of_structure(loop):
@@ -137,6 +136,13 @@ def damper(facts: RunFacts) -> Section:
             "Residual of the validation tests over the variables that may explain it: mean and middle 80 %.",
         )
     return section
+
+
+def _largest_drive(summary: Mapping[str, Any]) -> str:
+    """Return the largest drive of the identified damper in words; without a drive, its limit is a placeholder."""
+    if summary.get("without_drive"):
+        return "all tests without drive"
+    return f"drive up to {quantity(summary['drive_limit'], summary['drive_unit'])}"
 
 
 def _of_structure(loop: Mapping[str, Any]) -> bool:
@@ -175,9 +181,14 @@ def _traced_model(section: Section, facts: RunFacts, loop: Mapping[str, Any]) ->
         # the file of an own effect was moved or changed: the other results do not depend on it
         section.text(f"The parameters of the final model cannot be shown: {error}")
         return
-    exchange = exchange_in_words(loop)
-    if exchange:
-        section.text(exchange)
+    unproven = unproven_in_words(loop.get("further_terms") or [])
+    if unproven and statements.proper_effects(loop):
+        unproven += (
+            " All parameters are fitted again then, so that those of the effects may differ a little from above."
+        )
+    for text in (exchange_in_words(loop), unproven):
+        if text:
+            section.text(text)
     section.table(
         "traced",
         tables.traced_parameters(model),

@@ -118,7 +118,11 @@ def missing(facts: RunFacts) -> str:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         varies = f" It varies with {listed(states)}." if states else ""
         drift = _drift_of(summary)
-        return f"{subject} lacks something that no effect of the library explains.{varies}{drift}{exchange} {errors}"
+        lacks = f"{subject} lacks something that no effect of the library explains."
+        if form:
+            share = percent(summary["unexplained"]["share_of_residual"])
+            lacks = f"{form} What it leaves, {share} of the squared residual, no effect of the library explains."
+        return f"{lacks}{varies}{drift} {errors}"
     named = listed([f"**{effect['name']}**{_value_of(effect)}" for effect in effects])
     sure = listed([_confidence(effect["confidence"]) for effect in effects])
     meanings = "".join(f" {effect['physics'].rstrip('.')}." for effect in effects if effect.get("physics"))
@@ -297,9 +301,10 @@ def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
     loop, damper, network = (facts.summary(name) for name in ("close-loop", "identify-damper", "train-forward"))
     if loop.get("noise_floor_nrmse"):
         found.append(("noise alone", loop["noise_floor_nrmse"], "noise"))
-    if proper_effects(loop):
-        form = exchanged_form(loop)
-        found.append((f"damper model {form + ' ' if form else ''}with the effect", loop["after"]["nrmse"], "after"))
+    form, effects = exchanged_form(loop), proper_effects(loop)
+    if effects or (form and "after" in loop):
+        parts = ["damper model", form, "with the effect" if effects else ""]
+        found.append((" ".join(filter(None, parts)), loop["after"]["nrmse"], "after"))
     if "validation_nrmse" in damper:
         found.append((f"damper model {damper['form']}", damper["validation_nrmse"], "before"))
     elif "before" in loop and loop.get("model"):

@@ -24,6 +24,7 @@ _COLUMNS = {
     "pause_s": ("pause [s]", 1.0),
     "current": ("drive", None),
     "current_a": ("largest drive", 1.0),
+    "drive_v": ("largest drive", 1.0),
 }
 """Key of a test of next-tests.yaml -> heading, and factor of the number."""
 
@@ -139,7 +140,7 @@ def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
 
 def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> pd.DataFrame:
     """Return tests to be made, with the headings and units that people use."""
-    headings = {**_COLUMNS, "current_a": (f"largest drive [{drive_unit}]", 1.0)}
+    headings = {**_COLUMNS, **dict.fromkeys(("current_a", "drive_v"), (f"largest drive [{drive_unit}]", 1.0))}
     rows = []
     for test in tests:
         row = {}

@@ -48,6 +48,13 @@ def test_checks_are_found_and_named_once() -> None:
 
 
 @pytest.mark.planted
+def test_a_wrong_unit_of_all_tests_is_not_said_of_one() -> None:
+    """The finding had named the test with the largest amplitude, as if the others were right."""
+    (finding,) = [item for item in judge(_bench(_scaled("displacement", 1e3))) if item.name == "unit-range"]
+    assert finding.test == "" and ", in 4 of 4 tests; the largest is that of test " in finding.sentence
+
+
+@pytest.mark.planted
 def test_a_sound_campaign_is_judged_sound() -> None:
     assert judge(_bench()) == ()
 

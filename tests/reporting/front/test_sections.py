@@ -12,6 +12,7 @@ import pytest
 
 from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.dampers.model import write_damper
+from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.page import first_screen, write_report
 from tests.exports.test_models import with_effect
@@ -143,3 +144,28 @@ def test_the_parameters_of_the_traced_model_are_a_table(tmp_path: Path) -> None:
     assert "base form bouc-wen" in tables["traced"]["caption"]
     forms = next(item["frame"] for item in found["trust"].items if item.get("name") == "forms")
     assert forms["note"].tolist() == ["in the final model", "declared"]
+
+
+def test_terms_that_are_not_proven_are_said_where_their_parameters_stand(tmp_path: Path) -> None:
+    """The table of the final model had listed them, and gave the effects other values than the table above."""
+    term = {"name": "inertia", "form": "mass", "confidence": 0.12, "tied_with": []}
+    for terms, said in (([term], True), ([], False)):
+        facts = run_in(tmp_path, tracing(further_terms=terms))
+        with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("close-loop")) as artifact:
+            write_damper(artifact, with_effect("heating", "cooling"))
+        texts = _damper_texts(facts)
+        assert ("In addition, inertia (mass, probability 0.12)" in texts) is said
+        assert ("a little from above" in texts) is said
+
+
+def test_a_damper_without_drive_has_no_largest_drive(tmp_path: Path) -> None:
+    """The report had said `drive up to 1.00 A` of a friction damper: the limit is a placeholder there."""
+    facts = run_in(tmp_path)
+    assert "drive up to 2.00 A." in _damper_texts(facts)
+    facts.summary("identify-damper")["without_drive"] = True  # type: ignore[index]
+    assert "all tests without drive." in _damper_texts(facts)
+
+
+def _damper_texts(facts: RunFacts) -> str:
+    (section,) = [item for item in sections(facts) if item.anchor == "damper"]
+    return " ".join(str(item.get("text", "")) for item in section.items)

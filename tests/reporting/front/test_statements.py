@@ -236,3 +236,12 @@ def test_an_exchanged_base_form_is_said(tmp_path: Path) -> None:
     assert "damper model rounded-yield with the effect 1.5 %" in answers(tmp_path, base_form=form)["Models"]
     same = {**form, "taken": "bouc-wen"}
     assert "in place of" not in answers(tmp_path, base_form=same)["Missing"]
+
+
+def test_a_base_form_that_explains_nearly_all_is_not_called_a_lack(tmp_path: Path) -> None:
+    """An electrorheological damper: the other base form had left 0.02 % of the squared residual, and no effect."""
+    form = {"declared": "bouc-wen", "taken": "rounded-yield", "tied_with": [], "nrmse": {}}
+    found = answers(tmp_path, base_form=form, effects=[], unexplained={**UNKNOWN, "share_of_residual": 2.5e-4})
+    assert "lacks something" not in found["Missing"]
+    assert "What it leaves, 0.025 % of the squared residual, no effect" in found["Missing"]
+    assert "damper model rounded-yield 1.5 %" in found["Models"]

@@ -34,7 +34,7 @@ def test_an_interval_over_decades_determines_nothing(low: float, high: float, ex
 
 @pytest.mark.parametrize("unit", ["A", "V"])
 def test_the_drive_of_tests_to_be_made_is_in_the_unit_of_the_campaign(unit: str) -> None:
-    frame = wanted_tests([{"name": "a", "current_a": 1.5}], unit)
+    frame = wanted_tests([{"name": "a", {"A": "current_a", "V": "drive_v"}[unit]: 1.5}], unit)
     assert frame[f"largest drive [{unit}]"].tolist() == ["1.50"]
 
 

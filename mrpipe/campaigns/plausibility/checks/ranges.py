@@ -87,12 +87,15 @@ def _outside(channel: str, entries: list[tuple[float, str]], limits: tuple[float
     if largest == 0.0 or low <= largest <= high:
         return None
     size = "large" if largest > high else "small"
+    beyond = sum(amplitude > high for amplitude, _ in entries)
+    several = f", in {beyond} of {len(entries)} tests; the largest is that of test {test}" if beyond > 1 else ""
     return Finding(
         name="unit-range",
         severity="error",
         channel=channel,
-        test=test if size == "large" else "",
-        sentence=f"an amplitude of {largest:.3g} {unit} is implausibly {size} (plausible: {low:g} to {high:g} {unit})",
+        test=test if beyond == 1 else "",
+        sentence=f"an amplitude of {largest:.3g} {unit} is implausibly {size} (plausible: {low:g} to {high:g} {unit})"
+        f"{several}",
         remedy=f"correct the unit of {channel} in campaign.yaml (a factor of 1000 is the usual mistake)",
         numbers={"amplitude_si": largest, "smallest_si": low, "largest_si": high},
     )

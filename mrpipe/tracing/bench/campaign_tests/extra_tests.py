@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,9 @@ _BY_STATE: Mapping[str, TestKind] = {
 
 WHETHER = "whether there is "
 """Beginning of a question about one effect; a sentence on several of them has it once."""
+
+_DRIVEN: frozenset[TestKind] = frozenset({"steps", "rest"})
+"""Kinds of test whose drive changes within the test."""
 
 _IN_DOUBT: tuple[TestKind, ...] = ("speeds", "steps", "amplitudes")
 
@@ -57,7 +60,7 @@ class Range:
     Attributes
     ----------
     stroke_m, speed_m_s, drive
-        Largest displacement [m], speed [m/s], and drive [A or V].
+        Largest displacement [m], speed [m/s], and drive [A or V], which is zero where no test has one.
     frequency_hz
         Usual frequency of the motion [Hz].
     duration_s
@@ -77,7 +80,9 @@ def range_of(recordings: Recordings) -> Range:
     periods = recordings.period_s[recordings.period_s > 0.0]
     frequency = 1.0 / float(np.median(periods)) if len(periods) else scales.speed / (2.0 * np.pi * scales.stroke)
     lengths = np.diff(recordings.starts) * recordings.dt
-    return Range(scales.stroke, scales.speed, scales.drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
+    # where the damper was never driven, its largest drive is not known, and it may have none
+    drive = scales.drive if np.any(recordings.drive) else 0.0
+    return Range(scales.stroke, scales.speed, drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
 
 
 def kinds_between(one: str, other: str, library: Mapping[str, Effect]) -> tuple[TestKind, ...]:
@@ -118,12 +123,28 @@ def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], reco
     tests: dict[str, list[dict[str, Any]]] = {}
     reasons: dict[str, dict[str, Any]] = {}
     for decides, kind in wanted:
-        tests.setdefault(kind, _MAKERS[kind](span))
+        if span.drive == 0.0 and kind in _DRIVEN:
+            continue
+        tests.setdefault(kind, list({item["name"]: item for item in _MAKERS[kind](span)}.values()))
         entry = reasons.setdefault(decides, {"decides": decides, "kinds": [], "tests": []})
         if kind not in entry["kinds"]:
             entry["kinds"].append(kind)
             entry["tests"] += [item["name"] for item in tests[kind]]
     return ExtraTests(tuple(item for made in tests.values() for item in made), tuple(reasons.values()))
+
+
+def _short(drive: float) -> str:
+    """Return a drive with three digits and without an exponent, for the name of a test."""
+    return f"{float(f'{drive:.3g}'):g}"
+
+
+def with_drive_unit(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> list[dict[str, Any]]:
+    """Return tests whose largest drive is named by its unit: `current_a`, or `drive_v` for a campaign in volts.
+
+    The setting `laboratory.bench.tests`, whose form the tests have, knows `current_a` only.
+    """
+    name = "current_a" if drive_unit == "A" else f"drive_{drive_unit.lower()}"
+    return [{name if key == "current_a" else key: value for key, value in test.items()} for test in tests]
 
 
 def _test(name: str, motion: str, amplitude: float, frequency: float, duration: float, **more: Any) -> dict[str, Any]:
@@ -146,7 +167,7 @@ def _speeds(span: Range) -> list[dict[str, Any]]:
     speeds = span.speed_m_s * np.geomspace(0.03, 1.5, 5)
     return [
         _test(
-            f"speed-{number}-{drive:.3g}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
+            f"speed-{number}-{_short(drive)}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
             current_a=drive,
         )
         for number, speed in enumerate(speeds, start=1)
@@ -166,7 +187,9 @@ def _steps(span: Range) -> list[dict[str, Any]]:
 
 def _positions(span: Range) -> list[dict[str, Any]]:
     return [
-        _test(f"dwell-{drive:.3g}", "dwell", span.stroke_m, span.frequency_hz, 2.0 * span.duration_s, current_a=drive)
+        _test(
+            f"dwell-{_short(drive)}", "dwell", span.stroke_m, span.frequency_hz, 2.0 * span.duration_s, current_a=drive
+        )
         for drive in (0.0, 0.5 * span.drive)
     ]
 
@@ -185,7 +208,7 @@ def _frequencies(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.5 * span.stroke_m
     highest = span.speed_m_s / (2.0 * np.pi * amplitude)
     return [
-        _test(f"frequency-{number}-{drive:.3g}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
+        _test(f"frequency-{number}-{_short(drive)}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
         for number, frequency in enumerate(highest * np.geomspace(0.15, 1.5, 4), start=1)
         for drive in (0.0, 0.5 * span.drive)
     ]
@@ -194,7 +217,7 @@ def _frequencies(span: Range) -> list[dict[str, Any]]:
 def _amplitudes(span: Range) -> list[dict[str, Any]]:
     return [
         _test(
-            f"amplitude-{share:g}-{drive:.3g}", "sine", share * span.stroke_m, span.frequency_hz, span.duration_s,
+            f"amplitude-{share:g}-{_short(drive)}", "sine", share * span.stroke_m, span.frequency_hz, span.duration_s,
             current_a=drive,
         )
         for share in (0.2, 0.5)
@@ -216,7 +239,7 @@ def _long(span: Range) -> list[dict[str, Any]]:
 
 def _reversal(span: Range) -> list[dict[str, Any]]:
     return [
-        _test(f"reversal-{drive:.3g}", "triangle", 0.2 * span.stroke_m, 0.5 * span.frequency_hz, span.duration_s,
+        _test(f"reversal-{_short(drive)}", "triangle", 0.2 * span.stroke_m, 0.5 * span.frequency_hz, span.duration_s,
               current_a=drive)
         for drive in (0.2 * span.drive, span.drive)
     ]  # fmt: skip
@@ -225,7 +248,7 @@ def _reversal(span: Range) -> list[dict[str, Any]]:
 def _constants(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.7 * span.stroke_m
     return [
-        _test(f"constant-{drive:.3g}-{factor:g}", "sine", amplitude, factor * span.frequency_hz, span.duration_s,
+        _test(f"constant-{_short(drive)}-{factor:g}", "sine", amplitude, factor * span.frequency_hz, span.duration_s,
               current_a=drive)
         for drive in (0.0, 0.3 * span.drive, 0.6 * span.drive, span.drive)
         for factor in (0.5, 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, get_args
 
 import numpy as np
@@ -23,11 +24,12 @@ from mrpipe.laboratory.options import BenchRig
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench.campaign_tests import extra_tests
-from mrpipe.tracing.bench.campaign_tests.extra_tests import Range, kinds_between, wanted_tests
+from mrpipe.tracing.bench.campaign_tests.extra_tests import Range, kinds_between, wanted_tests, with_drive_unit
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.options import TracingOptions
 
+RANGE_OF = extra_tests.range_of
 SPAN = Range(stroke_m=0.01, speed_m_s=0.08, drive=4.0, frequency_hz=1.0, duration_s=5.0)
 
 
@@ -49,6 +51,30 @@ def test_every_advice_and_need_of_the_library_leads_to_tests() -> None:
             assert kinds_between(effect.name, rival, damper_effects()) == separation.kinds
             kinds += separation.kinds
         assert set(kinds) <= set(extra_tests._MAKERS)
+
+
+@pytest.mark.property
+def test_a_damper_that_was_never_driven_gets_no_tests_with_a_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A friction damper without a drive had been advised to be tested at 1 A."""
+    scales = SimpleNamespace(stroke=0.01, speed=0.08, drive=1.0)
+    recordings = SimpleNamespace(
+        drive=np.zeros(2000), period_s=np.ones(1), starts=np.array([0, 2000]), dt=0.002, scales=lambda: scales
+    )
+    monkeypatch.setattr(extra_tests, "range_of", RANGE_OF)
+    asked = verdict(untestable={"delay": "the drive is constant", "remanence": "the drive is constant"})
+    assert wanted_tests(asked, damper_effects(), recordings).tests == ()  # type: ignore[arg-type]
+    asked["unexplained"] = {"structured": True, "depends_on": [{"state": "velocity"}, {"state": "past of drive"}]}
+    tests = wanted_tests(asked, damper_effects(), recordings).tests  # type: ignore[arg-type]
+    assert tests and all(item["current_a"] == 0.0 for item in tests)
+    assert len({item["name"] for item in tests}) == len(tests)
+
+
+@pytest.mark.property
+def test_a_drive_in_volts_is_not_called_a_current() -> None:
+    """A test at 1750 V had the key `current_a` in the JSON."""
+    tests = [{"name": "extra-long", "current_a": 1750.0}]
+    assert with_drive_unit(tests, "V") == [{"name": "extra-long", "drive_v": 1750.0}]
+    assert with_drive_unit(tests, "A") == tests
 
 
 @pytest.mark.property
