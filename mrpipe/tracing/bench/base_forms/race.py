@@ -14,13 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
-from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.weighting import centred, weighting
 from mrpipe.tracing.bench.base_forms.fits_of_forms import with_effects_of
 from mrpipe.tracing.bench.base_forms.sufficient_error import nrmse_of_noise, sufficient_chi_square
 from mrpipe.tracing.bench.selection.select import Selection, excess_over_noise
+from mrpipe.tracing.bench.selection.terms import other_places, with_terms_in_order
 from mrpipe.tracing.rules import RaceRules
 
 SEARCHED_FORMS = 3
@@ -261,7 +262,8 @@ def race(
         best = min(fits, key=lambda item: _draft_cost(item, noise, rules))
         for place in range(count, len(best.problem.terms) if len(best.problem.terms) > count + 1 else count):
             # the effect may be needed under the best base form only
-            fits += with_effects_of(_without(best, place), screened, jobs=jobs)
+            shorter = with_terms_in_order(best, other_places(best, place), iterations=1)
+            fits += with_effects_of(shorter, screened, jobs=jobs)
     if further is not None:
         fits += further(best)
         if len(best.problem.terms) > count:
@@ -298,13 +300,6 @@ def _compared(
     noise = min(noise, min(float(np.sum(model.squares)) for model in models) / max(float(np.sum(counts)), 1.0))
     own = tuple(term.effect.name for term in problem.terms)
     return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules, nrmse_of_noise(base, noise))
-
-
-def _without(found: Fit, place: int) -> Fit:
-    terms = tuple(term for k, term in enumerate(found.problem.terms) if k != place)
-    values = [item for k, item in enumerate(found.term_values) if k != place]
-    problem = replace(found.problem, terms=terms)
-    return fit(problem, start_of(problem, found.base_values, values), iterations=1)
 
 
 def _draft_cost(found: Fit, noise: float, rules: RaceRules) -> float:

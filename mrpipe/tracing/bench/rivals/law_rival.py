@@ -15,6 +15,7 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.rivals.named_effects import NamedEffects
 from mrpipe.tracing.bench.rivals.other_base_forms import ITERATIONS, Unseen
+from mrpipe.tracing.bench.selection.terms import other_places
 
 LAWS = tuple(law for law in YIELD_LAWS if law.saturates)
 """Numerical technique: laws of the yield force that saturate, each with two coefficients and a scale."""
@@ -63,8 +64,8 @@ def best_law(found: Fit, place: int) -> Fit:
         Which of its terms is left out.
     """
     problem = found.problem
-    terms = tuple(item for k, item in enumerate(problem.terms) if k != place)
-    values = [item for k, item in enumerate(found.term_values) if k != place]
+    rest = other_places(found, place)
+    terms, values = tuple(problem.terms[k] for k in rest), [found.term_values[k] for k in rest]
     fits = []
     for law in LAWS:
         base = replace(problem.base, laws=(law, *problem.base.laws[1:]))

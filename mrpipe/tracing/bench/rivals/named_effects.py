@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.selection.select import Selection
+from mrpipe.tracing.bench.selection.terms import with_terms_in_order
 from mrpipe.tracing.gain import Gain
-
-ITERATIONS = 15
-"""Numerical technique: largest number of steps of a fit without one of the effects."""
 
 
 @dataclass(frozen=True)
@@ -94,15 +92,3 @@ class NamedEffects:
 def named_places(selection: Selection, declared: int) -> range:
     """Return the indices of the named effects among the terms of the chosen fit; `declared` terms come before them."""
     return range(declared, min(declared + selection.proven, len(selection.chosen.problem.terms)))
-
-
-def other_places(found: Fit, place: int) -> list[int]:
-    """Return the indices of all terms of a fit except one."""
-    return [k for k in range(len(found.problem.terms)) if k != place]
-
-
-def with_terms_in_order(found: Fit, places: Sequence[int]) -> Fit:
-    """Return a fit with these terms in this order, from the values of another fit."""
-    problem = replace(found.problem, terms=tuple(found.problem.terms[k] for k in places))
-    values = [found.term_values[k] for k in places]
-    return fit(problem, start_of(problem, found.base_values, values), iterations=ITERATIONS)

@@ -15,15 +15,11 @@ from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
 from mrpipe.tracing.bench.base_forms.promotion import with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race
-from mrpipe.tracing.bench.rivals.named_effects import (
-    NamedEffects,
-    named_places,
-    other_places,
-    with_terms_in_order,
-)
+from mrpipe.tracing.bench.rivals.named_effects import NamedEffects, named_places
 from mrpipe.tracing.bench.rivals.other_base_forms import Orders, best_rival, with_rival_base_form
 from mrpipe.tracing.bench.selection.refine import with_best_forms
 from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
+from mrpipe.tracing.bench.selection.terms import other_places, with_terms_in_order
 
 
 def without_superfluous(
