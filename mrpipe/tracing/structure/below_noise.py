@@ -16,9 +16,10 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.structures.dynamics import ComplexArray
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted, Placed, columns_of
-from mrpipe.tracing.structure.fit import Design, design_of, solve
+from mrpipe.tracing.structure.fit import Design, design_of, solve, stacked
 from mrpipe.tracing.structure.flexible import gain_beyond, projected_variants
 from mrpipe.tracing.structure.left_out import Folds, gains_of
 from mrpipe.tracing.structure.rounds import (
@@ -82,30 +83,35 @@ class _Judge:
         return float(np.sum(residual**2) - np.sum(solve(whole, np.concatenate(columns, axis=2)).residual ** 2))
 
     def matters(self, item: FrameCandidate) -> bool:
-        """Return whether an effect changes the motion of a storey in some record by an amount that matters.
+        """Return whether an effect changes the motion of a storey in some record by a share that matters.
 
-        A force changes the motion by about its share of the force that drives the motion. At a resonance this is a
-        small part of the force of the storey, most of which stiffness and inertia balance.
+        In each group of lines a force changes the motion by its share of the force that drives the motion. At a
+        resonance this is a small part of the force of the storey, most of which stiffness and inertia balance. The
+        groups count by their part of the motion.
         """
-        groups, n = self.raw.groups, len(self.raw.design.residual)
-        before, after = (groups.mean_square(item) for item in (self.raw.design.residual, item.outcome.solved.residual))
+        design, groups, n = self.raw.design, self.raw.groups, len(self.raw.design.residual)
+        weight = np.concatenate([np.tile(one.weight, 2) for one in design.spectra], axis=1)
+        target = np.concatenate([stacked(one.target) for one in design.spectra], axis=1)
+        driving = np.concatenate([stacked(self._driving(one)) for one in design.spectra], axis=1)
+        force, drives, moves = (
+            np.bincount(groups.index.ravel(), weights=(lines**2).ravel())
+            for lines in ((design.residual - item.outcome.solved.residual) / weight, driving, target)
+        )
         place = groups.record * n + groups.storey
-        gain, response = (np.bincount(place, weights=w) for w in ((before - after) * groups.count, groups.response))
-        driving = np.concatenate([self._driving(item) for item in self.raw.design.spectra])
-        share = np.sqrt(np.maximum(gain, 0.0) / np.maximum(np.minimum(driving, response), 1e-300))
+        changed = np.bincount(place, weights=moves * force / np.maximum(np.minimum(drives, moves), 1e-300))
+        share = np.sqrt(changed / np.maximum(np.bincount(place, weights=moves), 1e-300))
         return bool(np.any(share > self.raw.rules.of_response))
 
-    def _driving(self, spectra: Spectra) -> FloatArray:
-        """Return the weighted sum of squares of the force that the ground exerts on each storey, shape (n,).
+    def _driving(self, spectra: Spectra) -> ComplexArray:
+        """Return the force that the ground exerts on each storey, or its own force if not the ground alone drives it.
 
-        It is infinite in records that the ground does not drive alone.
+        Shape (n, b) [N/sqrt(Hz)].
         """
-        n = spectra.record.floors
         if spectra.record.kind not in ("sweep", "random") or spectra.record.loads or spectra.record.damper:
-            return np.full(n, np.inf)
-        ground = spectra.regressors[2 * n]
+            return spectra.target
+        n = spectra.record.floors
         above = storey_sums(n) @ self.masses_kg
-        return np.asarray(np.sum(np.abs(above[:, None] * ground * spectra.weight) ** 2, axis=1))
+        return np.asarray(above[:, None] * spectra.regressors[2 * n])
 
     def further(self, first: FrameCandidate, others: Sequence[Fitted]) -> float:
         """Return the chi-square that another effect explains beyond all forms of the first one; 0 if it is noise."""
