@@ -164,10 +164,11 @@ class FrameRules(Section):
         "form of another.",
     )
     probability_below_noise: float = Field(
-        0.8,
+        0.83,
         gt=0.0,
         le=1.0,
-        description="The same for an effect that is smaller than the noise of each spectral line: PENDING",
+        description="The same for an effect that is smaller than the noise of each spectral line: 9 of 10 were "
+        "present, by the rule of succession.",
     )
     least_storey: float = Field(
         0.05,

@@ -4,7 +4,8 @@ Groups of lines show a residual that exceeds the noise, whatever its form. A for
 noise, because its projection onto the residual adds up over all lines (matched filter). Such a residual is too small
 to show that the form is right. The effect is therefore named only if no other effect of the library imitates it, if
 nothing significant remains for the others, and if single tests show it: what differs between tests alone may be a
-change of the structure or of a sensor.
+change of the structure or of a sensor. Only nonlinear forces count, because small differences between the frequency
+responses of the sensors leave a linear residual, which an oscillating base would explain.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from scipy import stats
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
 from mrpipe.tracing.options import NamingRules
-from mrpipe.tracing.structure.candidates import Fitted, Placed, columns_of
-from mrpipe.tracing.structure.fit import Design, design_of, solve, stacked
-from mrpipe.tracing.structure.flexible import gain_beyond, projected_variants
+from mrpipe.tracing.structure.candidates import Fitted, Placed
+from mrpipe.tracing.structure.fit import Design, design_of, stacked
+from mrpipe.tracing.structure.flexible import gain_beyond, is_linear, parts_of, projected_variants
 from mrpipe.tracing.structure.left_out import Folds, gains_of
 from mrpipe.tracing.structure.rounds import (
     BelowNoise,
@@ -74,13 +75,19 @@ class _Judge:
         least = self.least(len(fitted.placed.form.searched) + len(item.outcome.solved.amplitudes))
         return item.share > least and self._within_tests(fitted) > least
 
+    def residuals(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
+        """Return the residuals without and with the nonlinear part of an effect, shape (n, 2 b) each."""
+        design, about = self.raw.design, self.raw.about
+        linear, nonlinear = parts_of(fitted, design, about)
+        return gain_beyond(linear, nonlinear, design)
+
     def _within_tests(self, fitted: Fitted) -> float:
         """Return the chi-square that an effect explains beyond linear frames which differ from test to test."""
-        about = self.raw.about
-        columns = [item.project([columns_of(fitted, item.spectra[0], about)]) for item in self.alone]
+        parts = [parts_of(fitted, item, self.raw.about) for item in self.alone]
+        linear, nonlinear = (np.concatenate([pair[k] for pair in parts], axis=2) for k in (0, 1))
         residual = np.concatenate([item.residual for item in self.alone], axis=1)
         whole = replace(self.alone[0], residual=residual, free=sum(item.free for item in self.alone))
-        return float(np.sum(residual**2) - np.sum(solve(whole, np.concatenate(columns, axis=2)).residual ** 2))
+        return gain_of(*gain_beyond(linear, nonlinear, whole))
 
     def matters(self, item: FrameCandidate) -> bool:
         """Return whether an effect changes the motion of a storey in some record by a share that matters.
@@ -90,12 +97,13 @@ class _Judge:
         groups count by their part of the motion.
         """
         design, groups, n = self.raw.design, self.raw.groups, len(self.raw.design.residual)
+        without, with_it = self.residuals(item.outcome.fitted)
         weight = np.concatenate([np.tile(one.weight, 2) for one in design.spectra], axis=1)
         target = np.concatenate([stacked(one.target) for one in design.spectra], axis=1)
         driving = np.concatenate([stacked(self._driving(one)) for one in design.spectra], axis=1)
         force, drives, moves = (
             np.bincount(groups.index.ravel(), weights=(lines**2).ravel())
-            for lines in ((design.residual - item.outcome.solved.residual) / weight, driving, target)
+            for lines in ((without - with_it) / weight, driving, target)
         )
         place = groups.record * n + groups.storey
         changed = np.bincount(place, weights=moves * force / np.maximum(np.minimum(drives, moves), 1e-300))
@@ -119,13 +127,15 @@ class _Judge:
         columns = projected_variants([first.outcome.fitted], design, about)
         found = [0.0]
         for item in others:
-            without, with_it = gain_beyond(columns, item, design, about)
-            gain = float(np.sum(without**2) - np.sum(with_it**2))
-            own = len(item.placed.form.amplitudes) * (
-                len(design.residual) if item.placed.effect.acts_on == "storey" else 1
-            )
-            found.append(gain if gain > self.least(len(item.numbers) + own) else 0.0)
+            linear, nonlinear = parts_of(item, design, about)
+            gain = gain_of(*gain_beyond(np.concatenate([columns, linear]), nonlinear, design))
+            found.append(gain if gain > self.least(len(item.numbers) + len(nonlinear)) else 0.0)
         return max(found)
+
+
+def gain_of(without: FloatArray, with_it: FloatArray) -> float:
+    """Return the chi-square that a residual `with_it` an effect lacks, compared with one `without` it."""
+    return float(np.sum(without**2) - np.sum(with_it**2))
 
 
 def with_effect_below_noise(
@@ -160,15 +170,20 @@ def with_effect_below_noise(
     jobs
         Processes.
     """
-    if folds is None or not forms:
+    able = [item for item in forms if not is_linear(item, free.design, free.about)]
+    if folds is None or not able:
         return free
     raw = replace(free, below_noise=BelowNoise(1.0))
     alone = tuple(design_of(free.base, [item]) for item in free.design.spectra)
-    judge = _Judge(raw, len(forms), folds, alone, masses)
-    screened = screened_forms(raw, forms, raw.about, jobs)
+    judge = _Judge(raw, len(able), folds, alone, masses)
+    screened = screened_forms(raw, able, raw.about, jobs)
     if BY_SEARCH * max(raw.share(item.solved.residual) for item in screened) < judge.least(1):
         return free
-    every = round_of(raw, forms, raw.about, jobs, screened)
+    tried = round_of(raw, able, raw.about, jobs, screened)
+    gains = [gain_of(*judge.residuals(item.outcome.fitted)) for item in tried]
+    every = sorted(
+        (replace(item, share=gain) for item, gain in zip(tried, gains, strict=True)), key=lambda item: -item.share
+    )
     found = [item for item in every if judge.certain(item)]
     found = [item for item in found if gains_of(folds, (item.outcome.fitted,), 0, rng, draws)[0].significant]
     if not found or not judge.matters(found[0]):

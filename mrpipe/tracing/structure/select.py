@@ -167,7 +167,8 @@ def _beyond_forms(selection: FrameSelection, further: FrameCandidate) -> bool:
     form, and another effect can correct it. An effect of its own also explains something beyond all forms of the first.
     """
     columns = projected_variants(selection.chosen, selection.design, selection.about)
-    without, with_it = gain_beyond(columns, further.outcome.fitted, selection.design, selection.about)
+    own = projected(selection.design, (further.outcome.fitted,), selection.about)
+    without, with_it = gain_beyond(columns, own, selection.design)
     return selection.share(with_it) - selection.share(without) >= selection.rules.second_gain
 
 
