@@ -154,17 +154,24 @@ def _forward(
         gain = found[0].share - (1.0 - left)
         if gain < rules.second_gain or (len(rounds) > 1 and gain < rules.second_share * left):
             break
-        if selection.chosen and not _beyond_forms(selection, found[0]):
+        if selection.chosen and not beyond_forms(selection, found[0]):
             break
         selection = taken(selection, found[0])
     return replace(selection, rounds=tuple(rounds))
 
 
-def _beyond_forms(selection: FrameSelection, further: FrameCandidate) -> bool:
+def beyond_forms(selection: FrameSelection, further: FrameCandidate) -> bool:
     """Return whether a further effect is needed if the chosen ones may combine all their forms.
 
     No form of the library is exactly that of the structure. What an effect leaves where it acts is the error of its
-    form, and another effect can correct it. An effect of its own also explains something beyond all forms of the first.
+    form, and another effect can correct it. An effect of another cause also explains something beyond all these forms.
+
+    Parameters
+    ----------
+    selection
+        The chosen effects.
+    further
+        The further effect.
     """
     columns = projected_variants(selection.chosen, selection.design, selection.about)
     own = projected(selection.design, (further.outcome.fitted,), selection.about)
