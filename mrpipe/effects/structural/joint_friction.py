@@ -59,7 +59,7 @@ EFFECT = StructuralEffect(
             "F clip(drift since reversal / x_s)",
             (
                 shape(
-                    "slip_displacement", "m", "drift at which the joint slips", "stroke", 0.002, 0.6, (0.01, 0.05, 0.2)
+                    "slip_displacement", "m", "drift at which the joint slips", "stroke", 0.002, 0.2, (0.01, 0.05, 0.15)
                 ),
             ),
             (_FORCE,),
@@ -70,7 +70,7 @@ EFFECT = StructuralEffect(
         StructuralForm(
             "gradual-slip",
             "four slipping springs with limits of 1/2 to 4 x_s",
-            (shape("slip_displacement", "m", "drift around which slip begins", "stroke", 0.001, 0.3, (0.01, 0.05)),),
+            (shape("slip_displacement", "m", "drift around which slip begins", "stroke", 0.001, 0.1, (0.01, 0.05)),),
             (_FORCE,),
             slipping_step,
             5,
@@ -99,5 +99,6 @@ EFFECT = StructuralEffect(
             "free decay from two amplitudes: friction ends the decay, a cubic stiffness shifts the frequency"
         ),
         "base-rocking": Separation("free decay to rest: friction stops the motion abruptly"),
+        "yielding": Separation("the same motion at a tenth of the amplitude: a joint still slips there"),
     },
 )

@@ -163,6 +163,13 @@ class FrameRules(Section):
         description="The same for each of several effects: 2 of 3 were present; a further one may only correct the "
         "form of another.",
     )
+    probability_below_noise: float = Field(
+        0.83,
+        gt=0.0,
+        le=1.0,
+        description="The same for an effect that is smaller than the noise of each spectral line: 9 of 10 were "
+        "present, by the rule of succession.",
+    )
     least_storey: float = Field(
         0.05,
         ge=0.0,

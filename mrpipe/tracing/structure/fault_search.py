@@ -31,6 +31,9 @@ REFINED = 4
 STEPS = 8
 """Numerical technique: largest number of Gauss-Newton steps for gain and delay."""
 
+STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
+"""Numerical technique: shares of a step that are tried, because the residual is linear in small changes only."""
+
 CONVERGED = 1e-4
 """Numerical technique: change of gain, and of delay relative to the period of the fastest line, that ends the fit."""
 
@@ -100,10 +103,11 @@ def fault_in_record(
         for _ in range(STEPS):
             columns = sensitivity(best)
             change = np.linalg.lstsq(columns.T, stacked(error(best)).ravel(), rcond=None)[0]
-            tried = _changed_by(best, np.asarray(change), fastest)
-            if cost(tried) >= cost(best):
+            tries = (_changed_by(best, share * np.asarray(change), fastest) for share in STEP_LENGTHS)
+            better = next((item for item in tries if cost(item) < cost(best)), None)
+            if better is None:
                 break
-            best = tried
+            best = better
         found.append(_with_errors(best, sensitivity(best), cost(best) / (2 * record.target.size)))
     return min(found, key=cost)
 
@@ -163,11 +167,12 @@ def _fitted(fault: SensorFault, spectra: Sequence[Spectra], masses: FloatArray) 
     fastest = 2.0 * np.pi * float(spectra[0].frequencies_hz[-1])
     for _ in range(STEPS):
         change, _ = _step(best, design, masses)
-        tried = _changed_by(best, change, fastest)
-        own = _with(tried, spectra, masses)
-        if own.chi_square >= design.chi_square:
+        tries = (_changed_by(best, share * change, fastest) for share in STEP_LENGTHS)
+        solved = ((item, _with(item, spectra, masses)) for item in tries)
+        better = next((pair for pair in solved if pair[1].chi_square < design.chi_square), None)
+        if better is None:
             break
-        best, design = tried, own
+        best, design = better
         if float(np.max(np.abs(change * [1.0, fastest]))) < CONVERGED:
             break
     return _with_errors(best, _columns(best, design, masses), design.chi_square), design

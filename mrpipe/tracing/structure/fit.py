@@ -18,6 +18,11 @@ _TINY = 1e-9
 """Numerical technique: singular values below this share of the largest one count as zero."""
 
 
+_LINEAR = 1e-6
+"""Numerical technique: a column of which projection leaves a smaller share is linear in the motion; it counts as zero.
+"""
+
+
 @dataclass(frozen=True)
 class Columns:
     """Spectral lines of the unit forces of an effect in one record; an amplitude may act on several storeys.
@@ -92,12 +97,18 @@ class Design:
         return float(np.sum(self.residual**2)) / self.size
 
     def project(self, columns: Sequence[Columns]) -> FloatArray:
-        """Return the weighted columns minus their projection onto the linear model, shape (k, n, 2 b)."""
+        """Return the weighted columns minus their projection onto the linear model, shape (k, n, 2 b).
+
+        A force that is linear in the motion, such as that of a storey which never yields, leaves zeros instead of
+        rounding errors, because these would get an amplitude.
+        """
         weighted = weighted_columns(self.spectra, columns)
         for storey, basis in enumerate(self.basis):
             acting = np.flatnonzero(np.any(weighted[:, storey], axis=1))
             own = weighted[acting, storey]
-            weighted[acting, storey] = own - (own @ basis) @ basis.T
+            left = own - (own @ basis) @ basis.T
+            linear = np.linalg.norm(left, axis=1) < _LINEAR * np.linalg.norm(own, axis=1)
+            weighted[acting, storey] = np.where(linear[:, None], 0.0, left)
         return weighted
 
 

@@ -9,8 +9,11 @@ from mrpipe.tracing.evidence import evidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel
-from mrpipe.tracing.structure.rounds import FrameSelection
+from mrpipe.tracing.structure.rounds import FrameSelection, projected
 from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
+
+STANDARD_ERRORS = 3.0
+"""Numerical technique: an amplitude of a storey below this multiple of its standard error counts as zero."""
 
 BY_STOREY = 3
 """Numerical technique: with fewer storeys their largest amplitude is reported, else the median of acting storeys."""
@@ -33,7 +36,7 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
     most = _most_probable(selection, total >= rules.named_share)
     for place, item in enumerate(selection.chosen):
         count = _amplitudes_of(item, len(selection.design.residual))
-        own = after.amplitudes[first : first + count]
+        own = certain_amplitudes(item, after.amplitudes[first : first + count], selection)
         first += count
         if place < selection.declared:
             continue
@@ -67,7 +70,34 @@ def _most_probable(selection: FrameSelection, proven: bool) -> float:
     frame = selection.rules
     if len(selection.chosen) - selection.declared > 1:
         return frame.probability_of_several
+    if selection.below_noise is not None:
+        return frame.probability_below_noise
     return frame.probability_alone if proven else frame.probability_in_part
+
+
+def certain_amplitudes(item: Fitted, amplitudes: FloatArray, selection: FrameSelection) -> FloatArray:
+    """Return the amplitudes of storeys without those that the noise of the sensors explains, if any remain.
+
+    A storey whose drift hardly leaves the range in which an effect is linear determines its amplitude badly. The
+    columns are weighted by the noise, so that their products give the standard errors.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    selection
+        Linear frame with the records.
+    """
+    if item.placed.effect.acts_on != "storey":
+        return amplitudes
+    columns = projected(selection.design, (item,), selection.about).reshape(len(amplitudes), -1)
+    acting = np.flatnonzero((amplitudes > 0.0) & np.any(columns, axis=1))
+    errors = np.full(len(amplitudes), np.inf)
+    errors[acting] = np.sqrt(np.diag(np.linalg.pinv(columns[acting] @ columns[acting].T, hermitian=True)))
+    kept = amplitudes > STANDARD_ERRORS * errors
+    return np.where(kept, amplitudes, 0.0) if np.any(kept) else amplitudes
 
 
 def _amplitudes_of(item: Fitted, floors: int) -> int:

@@ -52,6 +52,22 @@ class FrameCandidate:
 
 
 @dataclass(frozen=True)
+class BelowNoise:
+    """Findings on effects that are smaller than the noise of each line.
+
+    Attributes
+    ----------
+    explained
+        Chi-square that the best effect, and the best one in addition to it, explain.
+    alike
+        Names of the effects that explain almost as much as the best one, which is the first name.
+    """
+
+    explained: float
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class FrameSelection:
     """Result of the selection on the training records.
 
@@ -81,6 +97,9 @@ class FrameSelection:
         Stiffness of the storeys of the shear frame, shape (n,) [N/m].
     rules
         Decision thresholds.
+    below_noise
+        Set if no group of lines exceeds the noise, but effects that act on all lines explain something; shares then
+        refer to what they explain.
     """
 
     base: Base
@@ -95,6 +114,7 @@ class FrameSelection:
     declared: int = 0
     storey_stiffness: FloatArray = field(default_factory=lambda: np.zeros(0))
     rules: FrameRules = field(default_factory=FrameRules)
+    below_noise: BelowNoise | None = None
 
     @property
     def about(self) -> Surroundings:
@@ -103,16 +123,26 @@ class FrameSelection:
 
     @property
     def structured(self) -> bool:
-        """Whether the residual exceeds the noise by an amount that matters."""
-        return self.groups.material(self.design.residual)
+        """Whether the residual exceeds the noise, or contains an effect below the noise, by an amount that matters."""
+        return self.below_noise is not None or self.groups.material(self.design.residual)
 
     @property
     def remaining(self) -> FloatArray:
         """Weighted residual with the chosen effects, or that of the linear frame without any, shape (n, 2 b)."""
         return self.residual if self.chosen else self.design.residual
 
+    def over(self, residual: FloatArray) -> FloatArray:
+        """Return what is missing in each group of lines: excess over the noise, or what an effect below it explains."""
+        if self.below_noise is None:
+            return self.groups.over(residual)
+        lower = self.rounds[0][0].outcome.solved.residual
+        before, after = (self.groups.mean_square(item) for item in (self.design.residual, lower))
+        return np.asarray(np.maximum(before - after, 0.0) * self.groups.count)
+
     def share(self, residual: FloatArray) -> float:
-        """Return the share of the excess over the noise that a fit explains."""
+        """Return the share of what is missing that a fit explains: of the excess over the noise, or of chi-square."""
+        if self.below_noise is not None:
+            return float(np.sum(self.design.residual**2) - np.sum(residual**2)) / self.below_noise.explained
         return 1.0 - self.groups.excess(residual) / max(self.groups.excess(self.design.residual), 1e-12)
 
 
@@ -127,16 +157,28 @@ def placed_forms(effects: Sequence[StructuralEffect], floors: int) -> list[Place
     return found
 
 
-def round_of(
-    selection: FrameSelection, forms: Sequence[Placed], about: Surroundings, jobs: int
-) -> tuple[FrameCandidate, ...]:
-    """Screen all forms at their starts, then search those of the best families."""
-    design, rules = selection.design, selection.rules
-    before = projected(design, selection.chosen, about) if selection.chosen else None
+def screened_forms(selection: FrameSelection, forms: Sequence[Placed], about: Surroundings, jobs: int) -> list[Outcome]:
+    """Return the best start of each form of the effects that are not chosen yet."""
+    before = projected(selection.design, selection.chosen, about) if selection.chosen else None
     present = {item.name for item in selection.chosen}
     able = [item for item in forms if item.effect.name not in present]
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        screened = list(pool.map(lambda item: search(item, design, before, about, screen_only=True), able))
+        return list(pool.map(lambda item: search(item, selection.design, before, about, screen_only=True), able))
+
+
+def round_of(
+    selection: FrameSelection,
+    forms: Sequence[Placed],
+    about: Surroundings,
+    jobs: int,
+    screened: Sequence[Outcome] | None = None,
+) -> tuple[FrameCandidate, ...]:
+    """Screen all forms at their starts (unless `screened` contains them), then search those of the best families."""
+    design, rules = selection.design, selection.rules
+    before = projected(design, selection.chosen, about) if selection.chosen else None
+    if screened is None:
+        screened = screened_forms(selection, forms, about, jobs)
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         families: dict[str, list[Outcome]] = {}
         for item in sorted(screened, key=lambda item: item.solved.chi_square):
             families.setdefault(item.fitted.name, []).append(item)

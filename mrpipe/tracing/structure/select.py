@@ -11,8 +11,10 @@ from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder
+from mrpipe.tracing.structure.below_noise import with_effect_below_noise
 from mrpipe.tracing.structure.candidates import Fitted, Placed, Surroundings
 from mrpipe.tracing.structure.fit import solve
+from mrpipe.tracing.structure.flexible import gain_beyond, projected_variants
 from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.left_out import Folds, folds_of, gains_of
 from mrpipe.tracing.structure.rocking import on_rocking_base
@@ -67,7 +69,8 @@ def select(
     )
     progress(0.3, "linear frames")
     if not simple.structured and not declared:
-        return simple
+        found = _below_noise(free, problem, forms, rules, most, rng, draws, jobs)
+        return simple if found.below_noise is None else found
     rocking = on_rocking_base(simple, free, forms, jobs, rules.least_share)
     if rocking is not None and not free.structured:
         folds = folds_of(rocking.base, problem.training, rocking.about)
@@ -75,12 +78,28 @@ def select(
     if declared:
         free = _with_declared(free, declared, len(problem.masses_kg), about, jobs)
     if most == 0 or not free.structured:
-        return free
+        return free if declared else _below_noise(free, problem, forms, rules, most, rng, draws, jobs)
     folds = folds_of(free.base, problem.training, about)
     found = needed_only(_forward(free, forms, folds, most, jobs, progress, rules), folds)
     if rocking is not None:
         found, folds = _better(found, folds, rocking, folds_of(rocking.base, problem.training, rocking.about))
     return replace(found, gains=gains_of(folds, found.chosen, found.declared, rng, draws)) if found.chosen else found
+
+
+def _below_noise(
+    free: FrameSelection,
+    problem: FrameProblem,
+    forms: Sequence[Placed],
+    rules: NamingRules,
+    most: int,
+    rng: np.random.Generator,
+    draws: int,
+    jobs: int,
+) -> FrameSelection:
+    if most == 0:
+        return free
+    folds = folds_of(free.base, problem.training, free.about)
+    return with_effect_below_noise(free, forms, folds, rules, problem.masses_kg, rng=rng, draws=draws, jobs=jobs)
 
 
 def _better(
@@ -135,8 +154,29 @@ def _forward(
         gain = found[0].share - (1.0 - left)
         if gain < rules.second_gain or (len(rounds) > 1 and gain < rules.second_share * left):
             break
+        if selection.chosen and not beyond_forms(selection, found[0]):
+            break
         selection = taken(selection, found[0])
     return replace(selection, rounds=tuple(rounds))
+
+
+def beyond_forms(selection: FrameSelection, further: FrameCandidate) -> bool:
+    """Return whether a further effect is needed if the chosen ones may combine all their forms.
+
+    No form of the library is exactly that of the structure. What an effect leaves where it acts is the error of its
+    form, and another effect can correct it. An effect of another cause also explains something beyond all these forms.
+
+    Parameters
+    ----------
+    selection
+        The chosen effects.
+    further
+        The further effect.
+    """
+    columns = projected_variants(selection.chosen, selection.design, selection.about)
+    own = projected(selection.design, (further.outcome.fitted,), selection.about)
+    without, with_it = gain_beyond(columns, own, selection.design)
+    return selection.share(with_it) - selection.share(without) >= selection.rules.second_gain
 
 
 def by_left_out_error(

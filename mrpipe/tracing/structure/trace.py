@@ -173,11 +173,21 @@ def _in_order(problem: FrameProblem, data: FrameData) -> list[Spectra]:
 def _unnamed(selection: FrameSelection, rules: NamingRules) -> str:
     if not selection.structured:
         return "the residual is noise: nothing is missing"
+    if selection.below_noise is not None and not selection.chosen:
+        return _undecided(selection.below_noise.alike)
     if len(selection.chosen) <= selection.declared:
         return "no effect of the library changes the error"
     if selection.share(selection.residual) < rules.least_share:
         return "no effect of the library recovers enough of what exceeds the noise"
     return ""
+
+
+def _undecided(alike: Sequence[str]) -> str:
+    """Return why no effect is named for a residual that is smaller than the noise of each line."""
+    small = "something smaller than the noise of each spectral line depends on the motion"
+    if len(alike) > 1:
+        return f"{small}; {listed(alike)} explain it alike"
+    return f"{small}; {alike[0]} explains only part of it"
 
 
 def _summary(
@@ -233,9 +243,12 @@ def _residual(selection: FrameSelection, problem: FrameProblem) -> dict[str, Any
     """Return whether the residual of the linear frame has a structure, and in which storeys and tests it is."""
     squares = selection.groups.mean_square(selection.design.residual)
     p_values = stats.chi2.sf(squares * selection.groups.count, selection.groups.count)
+    p_value = float(np.min(p_values)) * len(p_values)
+    if selection.below_noise is not None:
+        p_value = min(p_value, float(stats.chi2.sf(selection.below_noise.explained, len(p_values))))
     return {
         "structured": selection.structured,
-        "p_value": float(max(min(1.0, float(np.min(p_values)) * len(p_values)), 1e-300)),
+        "p_value": float(max(min(1.0, p_value), 1e-300)),
         "where": {f"storey_{k + 1}": value for k, value in enumerate(_by_storey(selection))},
         "by_test": _by_test(selection, problem),
         "chi_square": selection.design.chi_square,
@@ -266,7 +279,10 @@ def _unexplained(
     still = (
         selection.structured
         and explained < rules.named_share
-        and selection.groups.material(selection.design.residual if share is None else selection.residual)
+        and (
+            selection.below_noise is not None
+            or selection.groups.material(selection.design.residual if share is None else selection.residual)
+        )
     )
     return Unexplained(
         bool(still),
@@ -281,21 +297,21 @@ def _depends_on(after: FrameModel, problem: FrameProblem, storey: int) -> tuple[
 
 
 def _by_storey(selection: FrameSelection) -> list[float]:
-    over = selection.groups.over(selection.design.residual)
+    over = selection.over(selection.design.residual)
     n = len(selection.design.residual)
     sums = np.bincount(selection.groups.storey, weights=over, minlength=n)
     return [float(value) for value in sums / max(float(sums.sum()), 1e-300)]
 
 
 def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, float]:
-    over = selection.groups.over(selection.design.residual)
+    over = selection.over(selection.design.residual)
     sums = np.bincount(selection.groups.record, weights=over, minlength=len(problem.training))
     total = max(float(sums.sum()), 1e-300)
     return {item.record.name: float(value / total) for item, value in zip(problem.training, sums, strict=True)}
 
 
 def _worst_storey(selection: FrameSelection) -> int:
-    over = selection.groups.over(selection.remaining)
+    over = selection.over(selection.remaining)
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
 
 
@@ -340,6 +356,7 @@ def _verdict(
         form = f"explains what the training tests lack, but {in_words(differing)}"
         return Verdict("partly explained", f"{names}: {form}{drift}", share)
     if share >= rules.named_share:
-        return Verdict("explained", f"{names}: explains what is missing{drift}", share)
+        small = ", which is smaller than the noise of each spectral line" if selection.below_noise is not None else ""
+        return Verdict("explained", f"{names}: explains what is missing{small}{drift}", share)
     form = "explains part of what is missing; its form is not proven"
     return Verdict("partly explained", f"{names}: {form}{drift}", share)

@@ -35,6 +35,11 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
             total += (0.5, 0.8, 0.3)[s] * h
         elif code == 2:
             total += 2.0e7 * d**3 * (1.0 + 2e4 * d * d) if s == 1 else 0.0
+        elif code == 9:
+            # a part of storey 2 yields beyond 2 mm
+            h = z[6 + s]
+            out[6 + s] = (r - 0.5 * abs(r) * abs(h) * h - 0.5 * r * h * h) / 2e-3
+            total += 2.0 * h if s == 1 else 0.0
         elif code == 8:
             # damping that grows with the square of the drift
             total += 2.0e6 * d * d * r if s == 1 else 0.0
@@ -86,6 +91,7 @@ CODES = {
     "unknown": 6,
     "braced-rocking": 7,
     "nonlinear-damping": 8,
+    "yielding": 9,
 }
 
 

@@ -97,3 +97,16 @@ def test_a_prediction_is_the_sum_of_frame_and_effect() -> None:
     lines = np.ones((1, *record.target.shape), dtype=complex)
     both = predicted("shear-frame", record, linear, Columns(lines), np.array([3.0]))
     assert both - alone == pytest.approx(np.full(record.target.shape, 3.0 + 0j))
+
+
+def test_a_force_that_is_linear_in_the_motion_gets_no_amplitude() -> None:
+    """The elastic-plastic force of a storey that never yields is a spring; rounding errors are no evidence for it."""
+    found = design_of("linear-frame", problem().training)
+    columns = []
+    for item in problem().training:
+        lines = np.zeros((1, *item.target.shape), dtype=complex)
+        lines[0, 1] = item.lines_of(item.motion.displacement[:, 1] * 1e3)
+        columns.append(Columns(lines))
+    projected = found.project(columns)
+    assert not np.any(projected)
+    assert solve(found, projected).amplitudes.tolist() == [0.0]

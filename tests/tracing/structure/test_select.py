@@ -10,18 +10,21 @@ import pytest
 
 from mrpipe.effects.structural.library import all_structural_effects
 from mrpipe.tracing.options import NamingRules
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.candidates import Fitted, Outcome, Placed
 from mrpipe.tracing.structure.fit import Solved
+from mrpipe.tracing.structure.flexible import gain_beyond
 from mrpipe.tracing.structure.left_out import folds_of
 from mrpipe.tracing.structure.records import frame_data
-from mrpipe.tracing.structure.rounds import FrameSelection, admissible, placed_forms, taken
-from mrpipe.tracing.structure.select import by_left_out_error, needed_only, select
+from mrpipe.tracing.structure.rounds import FrameSelection, admissible, placed_forms, projected, taken
+from mrpipe.tracing.structure.select import beyond_forms, by_left_out_error, needed_only, select
 from tests.tracing.structure.rig import frame_campaign
 
 pytestmark = pytest.mark.planted
 
 LIBRARY = all_structural_effects()
+NONE, FIFTH = np.zeros(0), np.array([4.7])
 
 
 @functools.cache
@@ -125,6 +128,26 @@ def test_a_clear_lead_on_the_training_records_decides_alone() -> None:
     found = by_left_out_error((friction, cubic), replace(alone, chosen=()), folds, 0.3)
     assert [item.name for item in found] == ["joint-friction", "cubic-stiffness"]
     assert found[1].behind == pytest.approx(0.65)
+
+
+def test_a_storey_that_yields_is_not_called_a_slipping_joint() -> None:
+    found = selected("yielding", *LIBRARY)
+    assert [item.name for item in found.chosen] == ["yielding"]
+    friction = next(item for item in found.rounds[0] if item.name == "joint-friction")
+    assert friction.share < 0.5 * found.rounds[0][0].share
+
+
+def test_an_effect_that_corrects_the_form_of_another_is_not_needed() -> None:
+    """The planted stiffness also has a term of fifth degree, which a cubic one does not explain."""
+    alone = selected("cubic-stiffness", "joint-friction", "cubic-stiffness")
+    effect = LIBRARY["cubic-stiffness"]
+    cubic, power = (Fitted(Placed(effect, effect.forms[k]), numbers) for k, numbers in ((0, NONE), (2, FIFTH)))
+    before = replace(alone, chosen=(cubic,), rules=FrameRules(second_gain=0.005))
+    own = projected(before.design, (power,), before.about)
+    without, with_it = gain_beyond(projected(before.design, (cubic,), before.about), own, before.design)
+    assert before.share(with_it) - before.share(without) > before.rules.second_gain
+    candidate = replace(alone.rounds[0][0], outcome=Outcome(power, Solved(np.ones(3), with_it, 1.0)))
+    assert not beyond_forms(before, candidate)
 
 
 def test_rocking_under_a_braced_frame_is_not_named_for_the_bending() -> None:

@@ -10,9 +10,10 @@ import pytest
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.tracing.structure import fault_search
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.fault_search import likely_fault
-from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.fit import Design, design_of
 from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.records import FrameRecord, frame_data
 from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
@@ -106,6 +107,20 @@ def test_repaired_records_are_those_of_a_clean_frame(fault: str) -> None:
     before, after = (design_of("linear-frame", item.training) for item in (problem, again))
     assert groups_of(before).material(before.residual)
     assert not groups_of(after).material(after.residual)
+
+
+def test_a_step_that_is_too_long_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without shorter steps the fit of the gain ends where it began, and the fault is not found."""
+    problem, exact, steps = _problem("gain"), fault_search._step, []
+
+    def first_too_long(fault: SensorFault, design: Design, masses: FloatArray) -> tuple[FloatArray, float]:
+        change, expected = exact(fault, design, masses)
+        steps.append(change)
+        return (4.0 * change if len(steps) == 1 else change), expected
+
+    monkeypatch.setattr(fault_search, "_step", first_too_long)
+    found, _ = fault_search._fitted(SensorFault(3, ""), problem.training, problem.masses_kg)
+    assert found.gain == pytest.approx(0.85, abs=0.01)
 
 
 def test_no_fault_explains_a_nonlinear_stiffness() -> None:

@@ -234,7 +234,14 @@ def _errors(
 
 
 def _removals(tests: Sequence[PreparedTest]) -> list[MotionFilter]:
-    """Return the filter that removes the noise which all tests share, if the tests show such noise."""
+    """Return the filter that removes the noise which all tests share, if the tests show such noise.
+
+    Where the noise of the motion is known from its sensors, nothing is estimated from the spectra. A motion of laser
+    and accelerometers together has its noise in the band of the motion, and closed-loop tests all move in this band:
+    the estimate would contain the motion itself.
+    """
+    if any(test.displacement_noise_band_hz > 0.0 for test in tests):
+        return []
     noise = shared_noise(tests)
     return [] if noise is None else [MotionFilter(np.inf, noise)]
 

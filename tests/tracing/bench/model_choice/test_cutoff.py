@@ -78,6 +78,14 @@ def test_hum_that_all_tests_share_is_removed() -> None:
 
 
 @pytest.mark.planted
+def test_no_noise_is_estimated_from_the_spectra_where_the_sensors_give_it() -> None:
+    motions = [sine(0.01 * size, speed) for size in (0.5, 1.0) for speed in (0.5, 1.0, 1.5)]
+    tests = recorded(motions, "velocity", hum_m=1e-6)
+    known = [replace(test, displacement_noise_m=1e-6, displacement_noise_band_hz=10.0) for test in tests]
+    assert filter_of(known).noise is None
+
+
+@pytest.mark.planted
 def test_hum_is_filtered_where_the_noise_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     # a spectrum cannot separate the lines of the mains from motion; the force by velocity shows that they are none
     monkeypatch.setattr("mrpipe.tracing.bench.model_choice.cutoff.shared_noise", lambda _: None)
