@@ -255,6 +255,25 @@ def _adjusted(
     return amplitude, response if options.tracking == rig.options.tracking else None
 
 
+def drive_warning(damper: DamperModel, drive_limit: float | None) -> str:
+    """Return a warning if the controller may exceed the largest drive of the damper's model; else an empty text.
+
+    Parameters
+    ----------
+    damper
+        The damper.
+    drive_limit
+        Setting of the controller [A or V]; None: the limit of the damper.
+    """
+    if drive_limit is None or drive_limit <= damper.drive_limit:
+        return ""
+    return (
+        f"simulate.controller.drive_limit is {drive_limit:g} {damper.drive_unit}, and the model of the damper is valid "
+        f"up to {damper.drive_limit:g} {damper.drive_unit}: laws that command the drive extrapolate the model, and the "
+        "inverse of the model ends there"
+    )
+
+
 def record_warning(details: Mapping[str, Any]) -> str:
     """Return a warning if recorded ground motion has a peak that no ground motion reaches; else an empty text.
 
