@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, 
 from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.structures.over_amplitude import read_frame_at
+from mrpipe.structures.records import IMPOSSIBLE_PEAK
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Name of a damper of a run -> stage whose artifact contains it."""
@@ -189,7 +191,8 @@ def excitation_of(
     rig, settings
         Rig, and settings of the excitation.
     warn
-        Called with a message if the adjustment does not reach a response that the settings do not demand.
+        Called with a message if the adjustment does not reach a response that the settings do not demand, or if a
+        record has an impossible peak.
 
     Raises
     ------
@@ -201,7 +204,10 @@ def excitation_of(
     if amplitude is None and settings.kind in ADJUSTED:
         amplitude, viscous = _adjusted(rig, settings, lambda tried: harmonic_excitation(settings, free, tried), warn)
         viscous = viscous if settings.factor == 1.0 and settings.kind == "harmonic" and not settings.also else None
-    return acting_together(settings, rig.frame, free, amplitude or 0.0), viscous
+    excitation = acting_together(settings, rig.frame, free, amplitude or 0.0)
+    if warn is not None and (impossible := record_warning(excitation.details)):
+        warn(impossible)
+    return excitation, viscous
 
 
 def expected_top(rig: Rig) -> float:
@@ -247,6 +253,42 @@ def _adjusted(
     if warn is not None and (implausible := amplitude_warning(amplitude)):
         warn(implausible)
     return amplitude, response if options.tracking == rig.options.tracking else None
+
+
+def drive_warning(damper: DamperModel, drive_limit: float | None) -> str:
+    """Return a warning if the controller may exceed the largest drive of the damper's model; else an empty text.
+
+    Parameters
+    ----------
+    damper
+        The damper.
+    drive_limit
+        Setting of the controller [A or V]; None: the limit of the damper.
+    """
+    if drive_limit is None or drive_limit <= damper.drive_limit:
+        return ""
+    return (
+        f"simulate.controller.drive_limit is {drive_limit:g} {damper.drive_unit}, and the model of the damper is valid "
+        f"up to {damper.drive_limit:g} {damper.drive_unit}: laws that command the drive extrapolate the model, and the "
+        "inverse of the model ends there"
+    )
+
+
+def record_warning(details: Mapping[str, Any]) -> str:
+    """Return a warning if recorded ground motion has a peak that no ground motion reaches; else an empty text.
+
+    Parameters
+    ----------
+    details
+        Of the excitation.
+    """
+    peak = float(details.get("peak_m_s2", 0.0))
+    if peak <= IMPOSSIBLE_PEAK:
+        return ""
+    return (
+        f"the recorded ground motion has a peak of {peak:.3g} m/s^2, more than {IMPOSSIBLE_PEAK:.3g} m/s^2 (3 g), "
+        "which no recorded ground motion reaches. Check simulate.excitation.file_unit, and simulate.excitation.factor"
+    )
 
 
 def amplitude_warning(amplitude_m_s2: float) -> str:

@@ -30,7 +30,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import simulate as report
     from mrpipe.simulation.indices import indices, places_table
-    from mrpipe.simulation.rig import DAMPERS, excitation_of, read_rig, release_state
+    from mrpipe.simulation.rig import DAMPERS, drive_warning, excitation_of, read_rig, release_state
     from mrpipe.simulation.storage import write_response
     from mrpipe.simulation.training_range import check_ranges, ranges_as_json
 
@@ -38,6 +38,8 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     rig = read_rig(settings, context.artifact, context.settings.gains.source)
     if reason := rig.reason_to_skip(law):
         raise StageSkipped(reason)
+    if beyond := drive_warning(rig.damper, settings.controller.drive_limit):
+        context.warn(beyond)
     controller = rig.controller(law)
     excitation, viscous = excitation_of(rig, settings.excitation, context.warn)
     context.progress(0.4, f"loop under {law}")

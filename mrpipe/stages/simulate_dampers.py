@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import several_dampers as report
-    from mrpipe.simulation.rig import amplitude_warning
+    from mrpipe.simulation.rig import amplitude_warning, drive_warning, record_warning
     from mrpipe.simulation.several_dampers_rig import dampers_excitation, dampers_release, read_dampers_rig
     from mrpipe.simulation.several_dampers_storage import response_summary, write_dampers_response
 
@@ -28,6 +28,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         level = float(excitation.details.get("base_amplitude_m_s2", 0.0))
         if implausible := amplitude_warning(level):
             context.warn(implausible)
+    for damper in rig.dampers:
+        if beyond := drive_warning(damper.model, settings.controller.drive_limit):
+            context.warn(f"{damper.known.name}: {beyond}")
+    if impossible := record_warning(excitation.details):
+        context.warn(impossible)
     context.progress(0.2, "loop")
     response = rig.run(excitation, rng=context.rng, initial_state=dampers_release(rig, settings.excitation))
     summary = response_summary(rig, response, excitation)

@@ -29,7 +29,7 @@ from mrpipe.errors import StageSkipped, UserError
 from mrpipe.networks.network import write_network
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.simulation.rig import amplitude_warning
+from mrpipe.simulation.rig import amplitude_warning, drive_warning, record_warning
 from mrpipe.stages import calibrate, export_controller, export_models, export_opensees, resonance
 from mrpipe.stages.simulate import STAGES
 from mrpipe.structures import frame_from_parameter_set, natural_modes, shear_frame, write_frame
@@ -400,3 +400,19 @@ def test_an_implausible_base_amplitude_is_reported() -> None:
     said = amplitude_warning(18.0)
     assert "an amplitude of 18 m/s^2, more than 9.81 m/s^2" in said
     assert "simulate.excitation.base_amplitude_m_s2" in said
+
+
+@pytest.mark.property
+def test_a_record_in_the_wrong_unit_is_reported() -> None:
+    """A record in cm/s^2 without a header, read as m/s^2, has peaks of tens of g."""
+    assert record_warning({"kind": "recorded", "peak_m_s2": 12.0}) == record_warning({"peak_n": 3.0e4}) == ""
+    said = record_warning({"kind": "recorded", "peak_m_s2": 152.0})
+    assert "has a peak of 152 m/s^2, more than 29.4 m/s^2 (3 g)" in said
+    assert "simulate.excitation.file_unit" in said
+
+
+@pytest.mark.property
+def test_a_drive_beyond_the_model_of_the_damper_is_reported() -> None:
+    set_c = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    assert drive_warning(set_c, None) == drive_warning(set_c, 4.0) == ""
+    assert "drive_limit is 8 A, and the model of the damper is valid up to 4 A" in drive_warning(set_c, 8.0)
