@@ -160,7 +160,8 @@ class DamperModel:
             If the lengths differ, or the interval is not positive.
         """
         given = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration, "drive": drive}
-        return run_chain(self.chain(), *_of_one_length(given), _positive(dt))[:, FORCE]
+        x, v, a, u = _of_one_length(given)
+        return run_chain(self.chain(), x, v, a, u, _positive(dt))[:, FORCE]
 
     def quasi_static_force(self, velocity: FloatArray | float, drive: FloatArray | float) -> FloatArray:
         """Return the post-yield force [N]: the hysteresis has yielded in the direction of motion, and there is no lag.
