@@ -151,7 +151,7 @@ def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) ->
 
 
 def _refuse_thousands(path: Path, lines: list[str], layout: TextEntry) -> None:
-    """Raise for the first row that is one of numbers but for separators of thousands."""
+    """Raise for the first row of numbers with separators of thousands."""
     for index in range(layout.skip_lines, min(len(lines), layout.skip_lines + 200)):
         for delimiter in [layout.delimiter] if layout.delimiter else ["\t", ";"]:
             fields = [item for item in _split(lines[index].strip("\r\n"), delimiter) if item]

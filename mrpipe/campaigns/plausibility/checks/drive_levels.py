@@ -30,7 +30,7 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
 
 
 def _is_zero(drives: Sequence[FloatArray]) -> bool:
-    """Whether a drive is zero, but for the noise of its sensor."""
+    """Whether a drive is the noise of its sensor about zero."""
     return float(np.abs(levels_of(drives)).max()) <= noise_of_levels(drives)
 
 
