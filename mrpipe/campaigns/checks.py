@@ -51,6 +51,13 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
         )
 
 
+WIDEST_NOISE = 14.0
+"""Range of a record of white noise, over its standard deviation, that no record of practical length exceeds."""
+
+WIDEST_LEVELS = 8.0
+"""The same for the means of its twentieths, over their standard deviation."""
+
+
 def clipped_share(values: FloatArray) -> float:
     """Return the share of samples at an extreme of a clipped channel; 0 if the channel is not clipped.
 
@@ -182,12 +189,12 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
     Raises
     ------
     UserError
-        If the range over all tests is below 1 % of the largest drive (noise of a constant), or there is no drive.
+        If the range over all tests is below 1 % of the largest drive or that of white noise, or there is no drive.
     """
     if not drives:
         raise UserError(source, "drive", "is not recorded in any training test", "an inverse model needs a drive")
-    levels = _levels(drives.values())
-    if not _vary(levels):
+    if not drive_varies(drives.values()):
+        levels = levels_of(drives.values())
         raise UserError(
             source,
             "drive",
@@ -199,17 +206,30 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
 
 def drive_varies(drives: Iterable[FloatArray]) -> bool:
     """Whether drives, shape (n,) for each test, determine an inverse model (:func:`require_varying`)."""
-    return _vary(_levels(drives))
+    drives = list(drives)
+    levels = levels_of(drives)
+    least = max(0.01 * float(np.abs(levels).max()), noise_of_levels(drives))
+    return float(np.ptp(levels)) > least
 
 
-def _levels(drives: Iterable[FloatArray]) -> FloatArray:
-    # the mean over a twentieth of each record separates a level from the noise on it
-    return np.concatenate([[block.mean() for block in np.array_split(item, 20) if block.size] for item in drives])
+def levels_of(drives: Iterable[FloatArray]) -> FloatArray:
+    """Return the mean drive of each twentieth of each record, which separates a level from the noise on it."""
+    means = [block.mean() for item in drives for block in np.array_split(item, 20) if block.size]
+    return np.array(means, dtype=np.float64)
 
 
-def _vary(levels: FloatArray) -> bool:
-    largest = float(np.abs(levels).max())
-    return bool(largest > 0.0 and float(np.ptp(levels)) > 0.01 * largest)
+def noise_of_levels(drives: Sequence[FloatArray]) -> float:
+    """Return the largest difference of :func:`levels_of` that white noise explains; 0 where a drive holds more.
+
+    The noise follows from the steps between samples. Its range within a test is limited, so that a drive that changes
+    within a test is not taken for noise.
+    """
+    steps = np.concatenate([np.diff(item) for item in drives])
+    sigma = float(np.sqrt(0.5 * np.mean(steps**2))) if steps.size else 0.0
+    if any(float(np.ptp(item)) > WIDEST_NOISE * sigma for item in drives):
+        return 0.0
+    shortest = max(min(item.size for item in drives) // 20, 1)
+    return WIDEST_LEVELS * sigma / float(np.sqrt(shortest))
 
 
 def require_roles(campaign: Campaign, source: str) -> None:

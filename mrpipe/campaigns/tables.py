@@ -146,7 +146,21 @@ def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) ->
             rows = _is_numeric(fields) or _begins_with_label(fields, lines[index + 1 : index + 2], delimiter)
             if rows and (delimiter is None or len(fields) > 1):
                 return index, delimiter, layout.decimal or _decimal(fields, lines[index + 1 :], delimiter)
+    _refuse_thousands(path, lines, layout)
     raise UserError(path, "", "holds no row of numbers", "name a delimited text, or give text: {skip_lines, delimiter}")
+
+
+def _refuse_thousands(path: Path, lines: list[str], layout: TextEntry) -> None:
+    """Raise for the first row of numbers with separators of thousands."""
+    for index in range(layout.skip_lines, min(len(lines), layout.skip_lines + 200)):
+        for delimiter in [layout.delimiter] if layout.delimiter else ["\t", ";"]:
+            fields = [item for item in _split(lines[index].strip("\r\n"), delimiter) if item]
+            grouped = [item for item in fields if _THOUSANDS.match(item) and not _NUMBER.match(item)]
+            known = [item for item in fields if item in grouped or _NUMBER.match(item) or is_stamp(item)]
+            if len(fields) > 1 and grouped and len(known) == len(fields):
+                decimal = "," if re.search(r",\d*$", grouped[0]) else "."
+                remedy = _remedy(grouped[0], np.array([True]), decimal)
+                raise UserError(path, f"line {index + 1}", f"{grouped[0]!r} is not a number", remedy)
 
 
 def _decimal(fields: list[str], following: list[str], delimiter: str | None) -> str:

@@ -342,6 +342,19 @@ def test_an_inverse_model_needs_a_drive_that_changes(tmp_path: Path) -> None:
     require_varying({test.name: test.used("drive") for test in varying.with_role("training")}, "b")
 
 
+@pytest.mark.planted
+def test_the_noise_of_a_current_sensor_is_not_a_drive_that_changes() -> None:
+    """The means of a zero current differ by more than 1 % of their largest, so that an inverse model was trained."""
+    rng = np.random.default_rng(1)
+    noise = {name: 2e-3 * rng.standard_normal(3000) for name in "abcd"}
+    with pytest.raises(UserError, match="never changes in the training tests"):
+        require_varying(noise, "a")
+    close = {name: values + level for (name, values), level in zip(noise.items(), (1.0, 1.0, 1.02, 1.02), strict=True)}
+    require_varying(close, "b")
+    ramp = {name: values + np.linspace(0.0, 0.05, 3000) for name, values in noise.items()}
+    require_varying(ramp, "c")
+
+
 FRAME = {
     "rig": "shear-frame",
     "frame": {"floor_masses_kg": [5.95, 5.95]},

@@ -124,3 +124,14 @@ def test_the_remedy_shows_what_would_be_right() -> None:
 
 def test_the_minus_sign_of_a_typesetter_is_a_minus() -> None:
     assert table_of_text(Path("a.csv"), "t,x\n0,\u22121.5\n1,2.5\n").column("x", "").tolist() == [-1.5, 2.5]
+
+
+@pytest.mark.golden
+def test_separators_of_thousands_in_the_first_row_are_named(tmp_path: Path) -> None:
+    """The file had been said to hold no row of numbers."""
+    rows = "\n".join(f"0,00{index};1.999,4;12,5" for index in range(9))
+    with pytest.raises(UserError) as caught:
+        table_of_text(tmp_path / "a.csv", f"t [s];i [mA];F [N]\n{rows}\n")
+    assert "line 2: '1.999,4' is not a number; write numbers without separators of thousands, as 1999,4" in str(
+        caught.value
+    )

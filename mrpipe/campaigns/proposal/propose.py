@@ -226,7 +226,8 @@ def _not_used(files: list[_File]) -> list[str]:
         for name, why in unreadable_channels(parts[0].file, columns).items():
             found.setdefault(name, []).append(f"{path.name}: {why}")
     return [
-        f"column {column} is not used: {lines[0]}" + (f" (and in {len(lines) - 1} other files)" if lines[1:] else "")
+        f"column {column} is not used: {lines[0]}"
+        + (f" (and in {counted(len(lines) - 1, 'other file')})" if lines[1:] else "")
         for column, lines in found.items()
     ]
 

@@ -48,6 +48,17 @@ def test_checks_are_found_and_named_once() -> None:
 
 
 @pytest.mark.planted
+def test_a_current_that_is_noise_alone_is_zero_and_not_negative() -> None:
+    rng = np.random.default_rng(1)
+
+    def noise(given: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {**given, "drive": 2e-3 * rng.standard_normal(given["drive"].size)}
+
+    names = {item.name for item in judge(_bench(noise))}
+    assert "drive-always-zero" in names and "drive-negative" not in names
+
+
+@pytest.mark.planted
 def test_a_wrong_unit_of_all_tests_is_not_said_of_one() -> None:
     """The finding had named the test with the largest amplitude, as if the others were right."""
     (finding,) = [item for item in judge(_bench(_scaled("displacement", 1e3))) if item.name == "unit-range"]

@@ -379,7 +379,7 @@ def test_a_clock_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     found, _ = _proposed(_write_bench(tmp_path / "raw", sizes, tail="End of test\n"), tmp_path / "beside")
     expected = (
         "column time is not used: a.csv: line 3002, column time: 'End of test' is not a number; delete the lines after "
-        "the last sample (and in 1 other files)"
+        "the last sample (and in 1 other file)"
     )
     assert expected in found.unsure
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.checks import drive_varies, levels_of, noise_of_levels
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.campaigns.plausibility.finding import Finding
 from mrpipe.campaigns.plausibility.library import Check
@@ -15,23 +16,27 @@ NEGATIVE = 0.05
 """Drive below zero, over the largest magnitude, from which it is reported; smaller ones are the offset of a sensor."""
 
 
-def _levels(tests: Iterable[Recording]) -> FloatArray:
-    """Return the mean drive of each twentieth of each record, which separates a level from the noise on it."""
-    drives = [test.used("drive") for test in tests if "drive" in test.channels]
-    means = [block.mean() for drive in drives for block in np.array_split(drive, 20) if block.size]
-    return np.array(means, dtype=np.float64)
+def _drives(tests: Iterable[Recording]) -> list[FloatArray]:
+    return [test.used("drive") for test in tests if "drive" in test.channels]
 
 
 def _judge(campaign: Campaign) -> Iterator[Finding]:
-    levels = _levels(campaign.with_role("training"))
-    if levels.size:
-        yield from _one_level(campaign, levels)
-    yield from _below_zero(campaign)
+    training = _drives(campaign.with_role("training"))
+    if training:
+        yield from _one_level(campaign, training)
+    every = _drives(campaign.recordings)
+    if every and not _is_zero(every):
+        yield from _below_zero(campaign)
+
+
+def _is_zero(drives: Sequence[FloatArray]) -> bool:
+    """Whether a drive is the noise of its sensor about zero."""
+    return float(np.abs(levels_of(drives)).max()) <= noise_of_levels(drives)
 
 
 def _below_zero(campaign: Campaign) -> Iterator[Finding]:
     """Yield a finding where the drive is negative: an error in all tests, a warning in some."""
-    levels = {test.name: _levels([test]) for test in campaign.recordings if "drive" in test.channels}
+    levels = {test.name: levels_of(_drives([test])) for test in campaign.recordings if "drive" in test.channels}
     largest = max((float(np.abs(item).max()) for item in levels.values()), default=0.0)
     below = {name: float(item.min()) for name, item in levels.items() if item.min() < -NEGATIVE * largest}
     if not below:
@@ -50,10 +55,9 @@ def _below_zero(campaign: Campaign) -> Iterator[Finding]:
     )
 
 
-def _one_level(campaign: Campaign, levels: FloatArray) -> Iterator[Finding]:
-    largest = float(np.abs(levels).max())
+def _one_level(campaign: Campaign, drives: Sequence[FloatArray]) -> Iterator[Finding]:
     unit = campaign.drive_unit
-    if largest == 0.0:
+    if _is_zero(drives):
         yield Finding(
             name="drive-always-zero",
             severity="warning",
@@ -63,8 +67,8 @@ def _one_level(campaign: Campaign, levels: FloatArray) -> Iterator[Finding]:
             remedy="check the column of the drive, or add training tests at other drives",
             numbers={f"level_{unit.lower()}": 0.0},
         )
-    elif float(np.ptp(levels)) <= 0.01 * largest:
-        level = float(levels.mean())
+    elif not drive_varies(drives):
+        level = float(levels_of(drives).mean())
         yield Finding(
             name="one-drive-level",
             severity="warning",
