@@ -16,7 +16,8 @@ import numpy as np
 
 from mrpipe.artifacts import Provenance
 from mrpipe.artifacts.plain import plain
-from mrpipe.errors import StageSkipped
+from mrpipe.config.located import located
+from mrpipe.errors import StageSkipped, UserError
 from mrpipe.pipeline.files_read import files_read
 from mrpipe.pipeline.manifest import Manifest, StageKey
 from mrpipe.pipeline.parts import PartWriter
@@ -124,6 +125,8 @@ class StageRunner:
             except StageSkipped as reason:
                 summary, skipped = {}, str(reason)
                 remove_outputs(stage, self.run_directory)
+            except UserError as error:
+                raise located(error, self.loaded) from error
         part.save()
         written = [] if skipped else [*stage.outputs, *part.files]
         outputs = {name: self.hashes.digest(self.run_directory / name) for name in written}

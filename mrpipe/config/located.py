@@ -1,0 +1,44 @@
+"""Place of a wrong setting: the file and the line in which it stands.
+
+The functions that use a setting know its section (`structure`), but not the file that it was read from. Their errors
+are completed here, where the configuration is known.
+"""
+
+from __future__ import annotations
+
+import re
+
+from mrpipe.artifacts.yaml_source import read_yaml
+from mrpipe.config.loader import LoadedConfig
+from mrpipe.errors import UserError
+
+_KEY = re.compile(r"[A-Za-z_]\w*(\.\w+|\[\d+\])*")
+
+
+def located(error: UserError, loaded: LoadedConfig) -> UserError:
+    """Return an error about a setting with its file and line; an error about anything else as it is.
+
+    Parameters
+    ----------
+    error
+        Its source is a section of the configuration, such as `structure`, or a setting within, such as
+        `structure.reduction`.
+    loaded
+        The configuration. A setting that an option `--set` gave is named with this option.
+    """
+    section, *_ = keys = error.source.split(".")
+    if section not in type(loaded.config).model_fields:
+        return error
+    is_key = _KEY.fullmatch(error.where) is not None
+    if is_key:
+        # an index in a message counts from 1, one of a line from 0, so that the list is looked up as a whole
+        keys = [*keys, *error.where.partition("[")[0].split(".")]
+    where = f"{error.source}{'.' if is_key else ', ' if error.where else ''}{error.where}"
+    given = [override.partition("=")[0].strip() for override in loaded.overrides]
+    if any(".".join(keys[:depth]) in given for depth in range(1, len(keys) + 1)):
+        return UserError("--set", where, error.problem, error.remedy)
+    lines = read_yaml(loaded.path).lines if loaded.path.is_file() else {}
+    known = next((place for depth in range(len(keys), 0, -1) if (place := tuple(keys[:depth])) in lines), None)
+    return UserError(
+        loaded.path, where if known is None else f"line {lines[known]}, {where}", error.problem, error.remedy
+    )
