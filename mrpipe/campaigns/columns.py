@@ -93,7 +93,9 @@ class DataFile:
             return replace(self, time_s=None, sampling_rate_hz=None)
         start, step, count = clock
         time: FloatArray = np.asarray(start + step * np.arange(count), dtype=np.float64)
-        return replace(self, time_s=time, sampling_rate_hz=1.0 / step)
+        # the rate that other formats get from such a clock, to the last digit
+        rate = 1.0 / float(np.median(np.diff(time))) if count > 1 else 1.0 / step
+        return replace(self, time_s=time, sampling_rate_hz=rate)
 
     def column(self, column: str | int, where: str) -> FloatArray:
         """Return one column, shape (n,).
