@@ -16,6 +16,8 @@ STEPS = 24
 """Number of steps from zero to the whole device."""
 MOST_HALVINGS = 10
 """A step after which two eigenvalues could be the followed one is halved this often at most."""
+ROUNDING = 1e-9
+"""Relative distance below which an eigenvalue equals the expected value, however near the next one is."""
 CLEARLY_NEARER = 0.3
 """An eigenvalue is the followed one if its distance from the expected value is below this share of that of the next."""
 
@@ -55,7 +57,8 @@ def _step(eigenvalues: Eigenvalues, last: _Followed, share: float, halvings: int
     distances = np.abs(poles - (last.pole + last.slope * (share - last.share)))
     nearest = int(np.argmin(distances))
     others = np.delete(distances, nearest)
-    if halvings < MOST_HALVINGS and np.any(CLEARLY_NEARER * others < distances[nearest]):
+    is_expected = distances[nearest] <= ROUNDING * np.abs(poles[nearest])
+    if not is_expected and halvings < MOST_HALVINGS and np.any(CLEARLY_NEARER * others < distances[nearest]):
         middle = _step(eigenvalues, last, 0.5 * (last.share + share), halvings + 1)
         return _step(eigenvalues, middle, share, halvings + 1)
     pole = complex(poles[nearest])

@@ -41,6 +41,20 @@ def test_steps_are_divided_where_eigenvalues_nearly_meet(swirl: float) -> None:
     assert followed_pole(both, 1j + swirl, 0.0) == pytest.approx(1j - swirl, abs=1e-9)
 
 
+@pytest.mark.property
+def test_rounding_of_two_equal_eigenvalues_divides_no_step() -> None:
+    """A device that is almost zero separates two equal eigenvalues by less than the rounding error."""
+    rng = np.random.default_rng(4)
+    shares = []
+
+    def both(share: float) -> np.ndarray:
+        shares.append(share)
+        return 20j + np.array([0.0, -1e-12 * share]) + 1e-13 * rng.standard_normal(2)
+
+    assert followed_pole(both, 20j, -1e-12) == pytest.approx(20j, abs=1e-9)
+    assert len(shares) == 25
+
+
 @pytest.mark.oracle
 def test_the_pole_of_a_strongly_coupled_damper_is_that_of_a_fine_continuation() -> None:
     # two storeys of which the lower one has the damper: mode 1 becomes overdamped, and mode 2 the locked mode
