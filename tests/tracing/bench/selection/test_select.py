@@ -120,7 +120,8 @@ def selection_of(monkeypatch: pytest.MonkeyPatch, base: float, *left: float) -> 
     monkeypatch.setattr(select, "_nothing_more", lambda *_: True)
     monkeypatch.setattr(select, "_nearer", lambda chosen, *_: chosen)
     monkeypatch.setattr(select, "last_term_may_be_named", lambda *_: True)
-    return forward_selection(after(base, 0), 1.0, [], most=len(left))
+    library: list[Any] = [SimpleNamespace(effect=SimpleNamespace(name="not chosen"))]
+    return forward_selection(after(base, 0), 1.0, library, most=len(left))
 
 
 @pytest.mark.property
