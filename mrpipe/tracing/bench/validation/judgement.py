@@ -85,6 +85,20 @@ class Evidence:
         return recovered_share(self.before, self.after, self.ceiling)
 
 
+def lowest_error(ceiling: float, interval: tuple[float, float], after: float) -> tuple[float, tuple[float, float]]:
+    """Return the lowest error that any model has reached, and its 95 % interval.
+
+    Parameters
+    ----------
+    ceiling, interval
+        NRMSE of a flexible model, and its 95 % interval.
+    after
+        NRMSE of the final model. Where it is lower than that of the flexible model, it is the lowest error.
+    """
+    lowest = min(ceiling, after)
+    return lowest, (min(interval[0], lowest), max(interval[1], lowest))
+
+
 def recovered_share(before: float, after: float, ceiling: float) -> float:
     """Return the share by which the squared error beyond a ceiling falls from `before` to `after`, 0 to 1."""
     able = before**2 - min(ceiling, after) ** 2

@@ -20,7 +20,7 @@ from mrpipe.tracing.bench.residuals.error_measures import score
 from mrpipe.tracing.bench.residuals.nuisances import session_of
 from mrpipe.tracing.bench.residuals.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.selection.select import Selection
-from mrpipe.tracing.bench.validation.judgement import recovered_share
+from mrpipe.tracing.bench.validation.judgement import lowest_error, recovered_share
 from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence, open_tests
 from mrpipe.tracing.bench.verdict.naming import Named, ranking
 from mrpipe.tracing.bench.verdict.offsets import OffsetFinding
@@ -122,6 +122,9 @@ class Summary:
                 after = flexible
                 effects_found.append(UNATTRIBUTED)
         score_before, score_after = found.score_before, score(found.recordings, found.measured, after)
+        lowest, lowest_interval = lowest_error(
+            self.judgement.ceiling, self.judgement.ceiling_interval, score_after.nrmse
+        )
         summary = {
             "model": options.model,
             "declared_effects": declared,
@@ -139,8 +142,8 @@ class Summary:
             "untestable": dict(untested),
             "after": score_after.as_json(),
             "ceiling": {
-                "nrmse": min(self.judgement.ceiling, score_after.nrmse),
-                "interval": list(self.judgement.ceiling_interval),
+                "nrmse": lowest,
+                "interval": list(lowest_interval),
                 "recovered": recovered_share(score_before.nrmse, found.nrmse(found.after), self.judgement.ceiling),
             },
             "unexplained": self._unexplained(options.rules),

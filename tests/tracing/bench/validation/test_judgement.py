@@ -7,7 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, recovered_share
+from mrpipe.tracing.bench.validation.judgement import (
+    Condition,
+    Evidence,
+    classify,
+    lowest_error,
+    recovered_share,
+)
 from mrpipe.tracing.bench.verdict.naming import calibrated_probability
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
@@ -115,3 +121,12 @@ def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
 def test_a_calibration_that_falls_or_leaves_0_to_1_is_refused(pairs: tuple[tuple[float, float], ...]) -> None:
     with pytest.raises(ValidationError, match="rise"):
         NamingRules(calibration=pairs)
+
+
+@pytest.mark.property
+@given(st.floats(0.01, 1.0), st.floats(0.5, 1.0), st.floats(1.0, 2.0), st.floats(0.001, 2.0))
+def test_the_interval_of_the_lowest_error_contains_it(ceiling: float, low: float, high: float, after: float) -> None:
+    """The final model may have a lower error than the flexible model, and lie below the interval of the latter."""
+    nrmse, interval = lowest_error(ceiling, (low * ceiling, high * ceiling), after)
+    assert nrmse == min(ceiling, after)
+    assert interval[0] <= nrmse <= interval[1] == high * ceiling
