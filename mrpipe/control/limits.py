@@ -180,7 +180,7 @@ def separated(position: FloatArray, angular_frequencies: FloatArray, shapes: Flo
     position
         Connectivity vector w, shape (n,).
     angular_frequencies, shapes
-        Of all modes, shape (n,) [rad/s] and (n, n), unit modal mass.
+        Frequencies and shapes of all modes, shape (n,) [rad/s] and (n, n), unit modal mass.
     """
     result = shapes.copy()
     smallest = STILL * float(np.max(np.abs(position @ shapes)))

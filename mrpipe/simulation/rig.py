@@ -280,7 +280,7 @@ def record_warning(details: Mapping[str, Any]) -> str:
     Parameters
     ----------
     details
-        Of the excitation.
+        Details of the excitation, with the peak of a record.
     """
     peak = float(details.get("peak_m_s2", 0.0))
     if peak <= IMPOSSIBLE_PEAK:

@@ -7,7 +7,7 @@ fitted again. Pairs of floors are exchanged as well.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -103,8 +103,7 @@ def fault_in_record(
         for _ in range(STEPS):
             columns = sensitivity(best)
             change = np.linalg.lstsq(columns.T, stacked(error(best)).ravel(), rcond=None)[0]
-            tries = (_changed_by(best, share * np.asarray(change), fastest) for share in STEP_LENGTHS)
-            better = next((item for item in tries if cost(item) < cost(best)), None)
+            better = next((item for item in _tries(best, np.asarray(change), fastest) if cost(item) < cost(best)), None)
             if better is None:
                 break
             best = better
@@ -167,8 +166,7 @@ def _fitted(fault: SensorFault, spectra: Sequence[Spectra], masses: FloatArray) 
     fastest = 2.0 * np.pi * float(spectra[0].frequencies_hz[-1])
     for _ in range(STEPS):
         change, _ = _step(best, design, masses)
-        tries = (_changed_by(best, share * change, fastest) for share in STEP_LENGTHS)
-        solved = ((item, _with(item, spectra, masses)) for item in tries)
+        solved = ((item, _with(item, spectra, masses)) for item in _tries(best, change, fastest))
         better = next((pair for pair in solved if pair[1].chi_square < design.chi_square), None)
         if better is None:
             break
@@ -183,6 +181,11 @@ def _with_errors(fault: SensorFault, columns: FloatArray, mean_square: float) ->
     covariance = np.linalg.pinv(columns @ columns.T) * max(mean_square, 1.0)
     gain, delay = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return replace(fault, gain_error=float(abs(fault.gain) * gain), delay_error_s=float(delay))
+
+
+def _tries(fault: SensorFault, change: FloatArray, fastest: float) -> Iterator[SensorFault]:
+    """Yield the fault after the whole step, and then after shorter ones."""
+    return (_changed_by(fault, share * change, fastest) for share in STEP_LENGTHS)
 
 
 def _changed_by(fault: SensorFault, change: FloatArray, fastest: float) -> SensorFault:
