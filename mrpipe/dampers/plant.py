@@ -15,6 +15,7 @@ The same chain serves the bench (:func:`run_chain` over recorded motion) and the
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +63,10 @@ WIRE_SIZE = 25
 
 BOOKKEEPING = 6
 """Number of values that :func:`advance` stores after the state of the steps: work, slip, time since the last reversal,
-largest current, last velocity other than 0, last force."""
+largest current, last velocity, last force."""
+
+RESTING = 1e-30
+"""Size of the last velocity [m/s] while the rod rests: its sign is the direction of the motion before."""
 
 STEP_SIGNATURE = void(float64[::1], float64[::1], float64[::1], float64)
 """The one compiled signature of a step: `@njit(STEP_SIGNATURE, cache=True)`."""
@@ -244,7 +248,7 @@ def begin_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> N
     ----------
     state
         State of the chain, followed by the bookkeeping from index `memory` on: work, slip, time since reversal, largest
-        current so far, last velocity other than 0, last force.
+        current so far, last velocity (at rest :data:`RESTING` in the direction before), last force.
     memory
         Length of the state of the steps.
     wire
@@ -257,13 +261,17 @@ def begin_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> N
             state[index] = 0.0
         state[memory + 4] = wire[VELOCITY]
     else:
+        # the velocity is linear between the samples, so that a reversal is not moved to the next sample
+        speed, speed_before, since = abs(wire[VELOCITY]), abs(state[memory + 4]), dt
         if wire[VELOCITY] * state[memory + 4] < 0.0:
+            since *= speed / (speed + speed_before)
+            speed_before = 0.0
             state[memory + 1] = 0.0
             state[memory + 2] = 0.0
-        if wire[VELOCITY] != 0.0:
-            state[memory + 4] = wire[VELOCITY]
-        state[memory + 1] += abs(wire[VELOCITY]) * dt
-        state[memory + 2] += dt
+        state[memory + 1] += 0.5 * (speed_before + speed) * since
+        state[memory + 2] += since
+        # where the rod rests, the direction before is kept, with a speed that does not count
+        state[memory + 4] = wire[VELOCITY] if speed > 0.0 else math.copysign(RESTING, state[memory + 4])
     for index in range(CURRENT, WIRE_SIZE):
         wire[index] = 0.0
     wire[FORCE] = state[memory + 5]

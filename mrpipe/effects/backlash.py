@@ -1,47 +1,77 @@
 """Backlash: play in the bearings of the rod."""
 
-# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.hysteresis import displacement_between, turning_share
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
+
+CORNER = 1.0 / 16.0
+"""Numerical technique: share of a step over which the damper takes up the speed of the rod after the flanks have met.
+Without it, the force at a sample would jump while the gap changes, and least squares would find no slope."""
+
+
+@njit(float64(float64, float64, float64, float64, float64), cache=True)
+def _last_turn(before: float, speed_before: float, x: float, v: float, dt: float) -> float:
+    """Return the place from which the rod moves to `x` without a reversal: its turning point, or its last place.
+
+    The arguments are those of :func:`turning_share`. At 250 samples a second a fast motion goes beyond its largest
+    sample by several per cent of a gap.
+    """
+    share = turning_share(before, speed_before, x, v, dt)
+    return before if share >= 1.0 else displacement_between(share, before, speed_before, x, v, dt)
+
+
+@njit(float64(float64, float64), cache=True)
+def _engaged(moved: float, rod: float) -> float:
+    """Return the share of the speed of the rod with which the damper moves at the end of a step, 0 to 1.
+
+    The force belongs to the end of the step, where the flanks are in contact if the damper has moved at all; the rise
+    from 0 to 1 is rounded (:data:`CORNER`).
+
+    Parameters
+    ----------
+    moved, rod
+        Distances that damper and rod moved since the last turning point of the rod [m].
+    """
+    # without a motion the velocity is unchanged
+    return (1.0 + CORNER) * moved / (moved + CORNER * rod) if rod != 0.0 else 1.0
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: gap [m] between the flanks, stiffness share within the gap, kind. State: damper positions.
+    """Parameters: gap [m] between the flanks, stiffness share within the gap, kind.
 
     Kinds: 0 the damper rests within the gap; 1 several plays of increasing gap (a worn bearing); 2 the damper follows
-    with a share of the motion within the gap.
+    with a share of the motion within the gap. State: places of the plays [m], damper [m], displacement and velocity of
+    the rod.
     """
-    x = wire[DISPLACEMENT]
-    gap, share, kind = parameters[0], parameters[1], parameters[2]
-    count = 3 if kind == 1.0 else 1
-    moved = 0.0
-    for index in range(count):
-        width = gap * (1.0 if count == 1 else (0.5 + 0.5 * index))
-        if wire[FIRST] > 0.5:
-            state[index] = x
-        before = state[index]
-        state[index] = min(max(before, x - 0.5 * width), x + 0.5 * width)
-        moved += (state[index] - before) / count
+    x, v = wire[DISPLACEMENT], wire[VELOCITY]
+    gap, share, kind = parameters[0], parameters[1] if parameters[2] == 2.0 else 0.0, parameters[2]
     if wire[FIRST] > 0.5:
-        state[3] = x
-        state[4] = x
+        for index in range(5):
+            state[index] = x
+        state[5] = v
         return
-    rod = x - state[4]
-    if kind == 2.0:
-        moved = moved + share * (rod - moved)
+    turn = _last_turn(state[4], state[5], x, v, dt)
+    count = 3 if kind == 1.0 else 1
+    moved, engaged = 0.0, 0.0
+    for index in range(count):
+        half = 0.5 * gap * (1.0 if count == 1 else (0.5 + 0.5 * index))
+        before = state[index]
+        at_turn = min(max(before, turn - half), turn + half)
+        state[index] = min(max(at_turn, x - half), x + half)
+        moved += (state[index] - before) / count
+        engaged += _engaged(state[index] - at_turn, x - turn) / count
+    state[3] += moved + share * (x - state[4] - moved)
     state[4] = x
-    state[3] += moved
+    state[5] = v
     wire[DISPLACEMENT] = state[3]
-    # share of the speed of the rod with which the damper moves: without a gap the velocity is unchanged
-    if rod != 0.0:
-        wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
+    wire[VELOCITY] *= engaged + share * (1.0 - engaged)
 
 
 _PLAYS = 8
@@ -49,29 +79,32 @@ _PLAYS = 8
 
 @njit(STEP_SIGNATURE, cache=True)
 def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: mean gap [m], spread of the gaps (0..1). State: plays, damper, rod.
+    """Parameters: mean gap [m], spread of the gaps (0..1). State: plays, damper, displacement and velocity of the rod.
 
     A Prandtl-Ishlinskii operator: the mean of plays with evenly spaced gaps from g (1 - s) to g (1 + s), as with soft
     or uneven flanks, which engage gradually.
     """
-    x = wire[DISPLACEMENT]
+    x, v = wire[DISPLACEMENT], wire[VELOCITY]
     gap, spread = parameters[0], parameters[1]
     if wire[FIRST] > 0.5:
         for index in range(_PLAYS + 2):
             state[index] = x
+        state[_PLAYS + 2] = v
         return
-    moved = 0.0
+    turn = _last_turn(state[_PLAYS + 1], state[_PLAYS + 2], x, v, dt)
+    moved, engaged = 0.0, 0.0
     for index in range(_PLAYS):
         half = 0.5 * gap * (1.0 + spread * ((2.0 * index + 1.0) / _PLAYS - 1.0))
         before = state[index]
-        state[index] = min(max(before, x - half), x + half)
+        at_turn = min(max(before, turn - half), turn + half)
+        state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / _PLAYS
-    rod = x - state[_PLAYS + 1]
+        engaged += _engaged(state[index] - at_turn, x - turn) / _PLAYS
     state[_PLAYS + 1] = x
+    state[_PLAYS + 2] = v
     state[_PLAYS] += moved
     wire[DISPLACEMENT] = state[_PLAYS]
-    if rod != 0.0:
-        wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
+    wire[VELOCITY] *= engaged
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -91,14 +124,47 @@ def lost_motion_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
     wire[VELOCITY] = max(moved, 0.0) if v > 0.0 else min(moved, 0.0)
 
 
+@njit(float64(float64[::1], float64, float64, float64), cache=True)
+def _across_free_gap(state: FloatArray, half: float, rod: float, force: float) -> float:
+    """Move the rod without a reversal, and return the distance [m] that the damper moves on the last flank.
+
+    Parameters
+    ----------
+    state
+        Of :func:`free_play_step`; the place in the gap and the position of the damper are changed.
+    half
+        Half of the gap [m].
+    rod
+        Motion of the rod [m].
+    force
+        Force at the last sample [N].
+    """
+    left, place = rod, state[0]
+    # distance that the damper can still move while its force presses on this flank
+    if abs(place) >= half and force * place > 0.0 and rod * force < 0.0:
+        change = state[1] - state[4]
+        slope = (force - state[3]) / change if abs(change) > 1e-12 else 0.0
+        reach = abs(rod) if slope <= 0.0 else abs(force) / slope
+        carried = min(abs(rod), reach) * (1.0 if rod > 0.0 else -1.0)
+        state[1] += carried
+        left -= carried
+        if left == 0.0:
+            return carried
+    free = min(max(place + left, -half), half) - place
+    state[0] = place + free
+    state[1] += left - free
+    return left - free
+
+
 @njit(STEP_SIGNATURE, cache=True)
 def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: gap [m]. State: position in the gap, damper position, rod position, last force, last damper position.
+    """Parameters: gap [m].
 
-    A joint without friction: the flank stays in contact while the force presses on it, so the gap is crossed when the
-    force passes zero. The instant between two samples follows from the slope of the force over the last step.
+    State: position in the gap, damper position, displacement of the rod, last force, last damper position, velocity of
+    the rod. A joint without friction: the flank stays in contact while the force presses on it, so the gap is crossed
+    when the force passes zero. The instant between two samples follows from the slope of the force over the last step.
     """
-    x = wire[DISPLACEMENT]
+    x, v = wire[DISPLACEMENT], wire[VELOCITY]
     half = 0.5 * parameters[0]
     force = wire[FORCE]
     if wire[FIRST] > 0.5:
@@ -107,39 +173,27 @@ def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         state[2] = x
         state[3] = 0.0
         state[4] = x
+        state[5] = v
         return
-    rod = x - state[2]
-    left = rod
-    moved = 0.0
-    place = state[0]
-    # distance that the damper can still move while its force presses on this flank
-    if abs(place) >= half and force * place > 0.0 and rod * force < 0.0:
-        change = state[1] - state[4]
-        slope = (force - state[3]) / change if abs(change) > 1e-12 else 0.0
-        reach = abs(rod) if slope <= 0.0 else abs(force) / slope
-        carried = min(abs(rod), reach) * (1.0 if rod > 0.0 else -1.0)
-        moved += carried
-        left -= carried
-    if left != 0.0:
-        free = min(max(place + left, -half), half) - place
-        place += free
-        moved += left - free
-    state[4] = state[1]
-    state[3] = force
-    state[1] += moved
+    damper = state[1]
+    turn = _last_turn(state[2], state[5], x, v, dt)
+    if turn != state[2]:
+        _across_free_gap(state, half, turn - state[2], force)
+    moved = _across_free_gap(state, half, x - turn, force)
     state[2] = x
-    state[0] = place
+    state[3] = force
+    state[4] = damper
+    state[5] = v
     wire[DISPLACEMENT] = state[1]
-    if rod != 0.0:
-        wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
+    wire[VELOCITY] *= _engaged(moved, x - turn)
 
 
 def _free(values: Values) -> list[Step]:
-    return [Step("free-play", Phase.MOTION, free_play_step, np.array([values["gap"]]), 5)]
+    return [Step("free-play", Phase.MOTION, free_play_step, np.array([values["gap"]]), 6)]
 
 
 def _play(gap: float, share: float, kind: float) -> list[Step]:
-    return [Step("play", Phase.MOTION, play_step, np.array([gap, share, kind]), 5)]
+    return [Step("play", Phase.MOTION, play_step, np.array([gap, share, kind]), 6)]
 
 
 def _hard(values: Values) -> list[Step]:
@@ -161,7 +215,7 @@ def _lost(values: Values) -> list[Step]:
 
 def _graded(values: Values) -> list[Step]:
     numbers = np.array([values["gap"], values["spread"]])
-    return [Step("graded-play", Phase.MOTION, graded_play_step, numbers, _PLAYS + 2)]
+    return [Step("graded-play", Phase.MOTION, graded_play_step, numbers, _PLAYS + 3)]
 
 
 _GAP = strength("gap", "m", "distance between the flanks", "stroke", 0.0, 0.5, 0.004, 0.016, 0.05, 0.15)

@@ -80,7 +80,7 @@ def _rise_of_fast_reversals(wire: FloatArray, state: FloatArray, parameters: Flo
     """
     if wire[FIRST] > 0.5:
         state[:] = 0.0
-    if wire[SINCE_REVERSAL] < 1.5 * dt:
+    if wire[SINCE_REVERSAL] <= dt:
         state[1] = state[0]
         state[2] = 0.0
     if parameters[3] == 0.0:

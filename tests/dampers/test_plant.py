@@ -7,7 +7,7 @@ import pytest
 
 from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
-from mrpipe.dampers.plant import CHAIN_LENGTH, Phase, Step, build_chain, idle_step, run_chain
+from mrpipe.dampers.plant import CHAIN_LENGTH, SINCE_REVERSAL, SLIP, Phase, Step, build_chain, idle_step, run_chain
 from mrpipe.effects.library import damper_effects
 from mrpipe.errors import UserError
 
@@ -42,3 +42,26 @@ def test_a_memory_that_is_too_short_is_no_silent_limit(effect: str, form: str, v
     run_chain(chain, *motion, 1e-3)
     with pytest.raises(UserError, match=r"looks back 0\.\d+ s, its memory of \d+ samples reaches"):
         run_chain(chain, *motion, 1e-5)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.9])
+def test_slip_and_time_since_the_reversal_count_from_the_instant_between_two_samples(phase: float) -> None:
+    rate, omega = 250.0, 2.0 * np.pi * 3.1
+    time = np.arange(500) / rate
+    angle = omega * time + phase
+    wires = run_chain(build_chain(_base()), np.sin(angle), omega * np.cos(angle), -(omega**2) * np.sin(angle),
+                      np.zeros(500), 1.0 / rate)  # fmt: skip
+    since = np.mod(angle - 0.5 * np.pi, np.pi)
+    after = angle > 0.5 * np.pi
+    np.testing.assert_allclose(wires[after, SINCE_REVERSAL], since[after] / omega, atol=2e-5)
+    np.testing.assert_allclose(wires[after, SLIP], 1.0 - np.cos(since[after]), atol=2e-3)
+
+
+@pytest.mark.property
+def test_a_rest_between_two_motions_does_not_hide_the_reversal() -> None:
+    v = np.array([1.0, 1.0, 0.0, 0.0, -1.0, -1.0, 0.0, -1.0])
+    x = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]))]) * 1e-3
+    wires = run_chain(build_chain(_base()), x, v, np.zeros(8), np.zeros(8), 1e-3)
+    np.testing.assert_allclose(wires[:, SINCE_REVERSAL] / 1e-3, [0, 1, 2, 3, 1, 2, 3, 4], rtol=1e-12)
+    np.testing.assert_allclose(wires[:, SLIP] / 1e-3, [0, 1, 1.5, 1.5, 0.5, 1.5, 2, 2.5], rtol=1e-12)

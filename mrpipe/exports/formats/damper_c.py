@@ -20,13 +20,17 @@ _ADVANCE = """\
         for (int index = 0; index < {BOOKKEEPING}; ++index) memory[index] = 0.0;
         memory[4] = velocity;
     }} else {{
+        const double speed = fabs(velocity);
+        double speed_before = fabs(memory[4]), since = dt;
         if (velocity * memory[4] < 0.0) {{
+            since *= speed / (speed + speed_before);
+            speed_before = 0.0;
             memory[1] = 0.0;
             memory[2] = 0.0;
         }}
-        if (velocity != 0.0) memory[4] = velocity;
-        memory[1] += fabs(velocity) * dt;
-        memory[2] += dt;
+        memory[1] += 0.5 * (speed_before + speed) * since;
+        memory[2] += since;
+        memory[4] = speed > 0.0 ? velocity : copysign({RESTING}, memory[4]);
     }}
     memory[{extra} + 1] = first ? 0.0 : memory[{extra} + 1] + dt;
     wire[{TIME}] = memory[{extra} + 1];
@@ -122,7 +126,13 @@ def _source(subject: Subject, damper: DamperModel) -> str:
         name: getattr(plant, name) for name in vars(plant) if name.isupper() and isinstance(getattr(plant, name), int)
     }
     advance = _ADVANCE.format(
-        **places, real="double", prefix=prefix, memory=at, extra=plant.BOOKKEEPING, calls="\n".join(calls)
+        **places,
+        RESTING=plant.RESTING,
+        real="double",
+        prefix=prefix,
+        memory=at,
+        extra=plant.BOOKKEEPING,
+        calls="\n".join(calls),
     )
     reset = f"""\
 void {prefix}_reset(double state[{prefix.upper()}_STATE_SIZE])

@@ -30,15 +30,24 @@ function [force, state] = {prefix}(state, displacement, velocity, acceleration, 
         state({at} + 1:{at} + {BOOKKEEPING}) = 0;
         state({at} + 5) = velocity;
     else
+        speed = abs(velocity);
+        speed_before = abs(state({at} + 5));
+        since = dt;
         if velocity * state({at} + 5) < 0
+            since = dt * speed / (speed + speed_before);
+            speed_before = 0;
             state({at} + 2) = 0;
             state({at} + 3) = 0;
         end
-        if velocity ~= 0
+        state({at} + 2) = state({at} + 2) + 0.5 * (speed_before + speed) * since;
+        state({at} + 3) = state({at} + 3) + since;
+        if speed > 0
             state({at} + 5) = velocity;
+        elseif state({at} + 5) < 0
+            state({at} + 5) = -{RESTING};
+        else
+            state({at} + 5) = {RESTING};
         end
-        state({at} + 2) = state({at} + 2) + abs(velocity) * dt;
-        state({at} + 3) = state({at} + 3) + dt;
     end
     if first
         state({at} + {BOOKKEEPING} + 2) = 0;
@@ -95,6 +104,7 @@ def _files(subject: Subject) -> Files:
     }
     main = _MAIN.format(
         **places,
+        RESTING=plant.RESTING,
         prefix=prefix,
         form=damper.form,
         unit=damper.drive_unit,
