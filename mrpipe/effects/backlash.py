@@ -14,6 +14,9 @@ CORNER = 1.0 / 16.0
 """Numerical technique: share of a step over which the damper takes up the speed of the rod after the flanks have met.
 Without it, the force at a sample would jump while the gap changes, and least squares would find no slope."""
 
+FINE_CORNER = 1.0 / 64.0
+"""The same for graded plays, whose search begins at the gap that another form has found."""
+
 
 @njit(float64(float64, float64, float64, float64, float64), cache=True)
 def _last_turn(before: float, speed_before: float, x: float, v: float, dt: float) -> float:
@@ -26,20 +29,22 @@ def _last_turn(before: float, speed_before: float, x: float, v: float, dt: float
     return before if share >= 1.0 else displacement_between(share, before, speed_before, x, v, dt)
 
 
-@njit(float64(float64, float64), cache=True)
-def _engaged(moved: float, rod: float) -> float:
+@njit(float64(float64, float64, float64), cache=True)
+def _engaged(moved: float, rod: float, corner: float) -> float:
     """Return the share of the speed of the rod with which the damper moves at the end of a step, 0 to 1.
 
     The force belongs to the end of the step, where the flanks are in contact if the damper has moved at all; the rise
-    from 0 to 1 is rounded (:data:`CORNER`).
+    from 0 to 1 is rounded.
 
     Parameters
     ----------
     moved, rod
         Distances that damper and rod moved since the last turning point of the rod [m].
+    corner
+        Rounding, see :data:`CORNER` [1].
     """
     # without a motion the velocity is unchanged
-    return (1.0 + CORNER) * moved / (moved + CORNER * rod) if rod != 0.0 else 1.0
+    return (1.0 + corner) * moved / (moved + corner * rod) if rod != 0.0 else 1.0
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -66,7 +71,7 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / count
-        engaged += _engaged(state[index] - at_turn, x - turn) / count
+        engaged += _engaged(state[index] - at_turn, x - turn, CORNER) / count
     state[3] += moved + share * (x - state[4] - moved)
     state[4] = x
     state[5] = v
@@ -99,7 +104,7 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / _PLAYS
-        engaged += _engaged(state[index] - at_turn, x - turn) / _PLAYS
+        engaged += _engaged(state[index] - at_turn, x - turn, FINE_CORNER) / _PLAYS
     state[_PLAYS + 1] = x
     state[_PLAYS + 2] = v
     state[_PLAYS] += moved
@@ -185,7 +190,7 @@ def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     state[4] = damper
     state[5] = v
     wire[DISPLACEMENT] = state[1]
-    wire[VELOCITY] *= _engaged(moved, x - turn)
+    wire[VELOCITY] *= _engaged(moved, x - turn, CORNER)
 
 
 def _free(values: Values) -> list[Step]:
