@@ -217,11 +217,11 @@ def design(
     from mrpipe.law_design.results import design_as_json
     from mrpipe.law_design.run import load_of, run_design
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
-    from mrpipe.simulation.resonance import BAND
+    from mrpipe.simulation.resonance import band_of
 
     chosen = settings_of(DesignSettings, "design", {"laws": tuple(laws), **settings})
     rig, plant = _rig(_plain(frame), damper, floor, tuple(law_named(name) for name in ("vd", *laws)), None, {})
-    band = chosen.band_rad_s or (BAND[0] * plant.modes.omega_0, BAND[1] * plant.modes.omega_inf)
+    band = chosen.band_rad_s or band_of(plant.modes.omega_0, plant.modes.omega_inf)
     result = run_design(
         rig,
         plant,

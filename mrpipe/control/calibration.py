@@ -199,17 +199,17 @@ def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) ->
         If the frame or the position allows no calibration.
     """
     modes, static = limits.limiting_modes(frame, position, options.mode), limits.static_stiffness(frame, position)
-    positive, negative = options.positive_stiffness_n_m, options.negative_stiffness_n_m
+    shares = {"vdps": POSITIVE_SHARE, "vdns": NEGATIVE_SHARE}
+    chosen = {"vdps": options.positive_stiffness_n_m, "vdns": options.negative_stiffness_n_m}
+    default = {law: shares[law] * static if k is None else k for law, k in chosen.items()}
     return Plant(
         frame=frame,
         bare=exact.undamped(frame),
         position=position,
         modes=modes,
         static_stiffness_n_m=static,
-        stiffness_n_m={
-            "vdps": POSITIVE_SHARE * static if positive is None else positive,
-            "vdns": NEGATIVE_SHARE * static if negative is None else negative,
-        },
+        # c is calibrated for the stiffness with which the law runs, which the user may give as a gain
+        stiffness_n_m={law: options.overrides.get(law, {}).get("k_n_m", k) for law, k in default.items()},
         weights=balanced_weights(modes) if options.weights is None else options.weights,
     )
 

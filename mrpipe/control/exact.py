@@ -146,13 +146,13 @@ def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimu
     best = int(np.argmax(values))
     low, high = float(scan[best - 1]) if best else 0.0, float(scan[min(best + 1, len(scan) - 1)])
     if values[best] >= CRITICAL:
-        critical = _first_critical(damping_ratio, low, float(scan[best]))
+        critical = first_critical(damping_ratio, low, float(scan[best]))
         return Optimum(critical, damping_ratio(critical))
     found = minimize_scalar(lambda gain: -damping_ratio(float(gain)), bounds=(low, high), method="bounded")
     return Optimum(float(found.x), float(-found.fun))
 
 
-def _first_critical(damping_ratio: Callable[[float], float], low: float, high: float) -> float:
+def first_critical(damping_ratio: Callable[[float], float], low: float, high: float) -> float:
     """Return the smallest gain with critical damping between `low`, which has less, and `high`, which has it."""
     for _ in range(40):
         middle = 0.5 * (low + high)

@@ -40,8 +40,9 @@ def describe(
     """
 
     modes = calibration.modes
+    locked = "no motion" if modes.is_single else f"{modes.omega_inf:.3f} rad/s"
     sink.text(
-        f"Mode {modes.mode}: {modes.omega_0:.3f} rad/s free, {modes.omega_inf:.3f} rad/s with the damper locked, modal "
+        f"Mode {modes.mode}: {modes.omega_0:.3f} rad/s free, {locked} with the damper locked, modal "
         f"flexibility {modes.nu:.4g} m/N, static stiffness at the damper {calibration.static_stiffness_n_m:.0f} N/m."
     )
     rows = [
@@ -74,7 +75,8 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
     estimate = np.array([limits.damping_estimate(modes, 0.0, value * modes.omega_0) for value in c])
     marks = {"vd as run": (laws["vd"].gains.c_n_s_m, laws["vd"].damping_ratio_exact)}
     sink.figure("viscosity", figures.damping_over_gain(c, over_c, estimate, marks, "c [N s/m]"), "Viscous damping.")
-    alpha = np.linspace(1.5 / modes.nu / points, 1.5 / modes.nu, points)
+    largest = 0.75 * limits.largest_friction(modes)
+    alpha = np.linspace(largest / points, largest, points)
     H = [friction_stiffness(float(value)) for value in alpha]
     sink.figure(
         "friction",
