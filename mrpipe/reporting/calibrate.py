@@ -71,7 +71,8 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
     c = np.linspace(optimum / points, 2.0 * optimum, points)
     k = np.linspace(-1.1 * calibration.static_stiffness_n_m, calibration.static_stiffness_n_m, points)
     laws = calibration.laws
-    over_c = np.array([exact.exact_damping(bare, position, modes, float(value), 0.0).damping_ratio for value in c])
+    target = exact.target_mode(bare, position, modes)
+    over_c = np.array([target.linear(float(value), 0.0).damping_ratio for value in c])
     estimate = np.array([limits.damping_estimate(modes, 0.0, value * modes.omega_0) for value in c])
     marks = {"vd as run": (laws["vd"].gains.c_n_s_m, laws["vd"].damping_ratio_exact)}
     sink.figure("viscosity", figures.damping_over_gain(c, over_c, estimate, marks, "c [N s/m]"), "Viscous damping.")

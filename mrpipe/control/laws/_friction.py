@@ -53,8 +53,10 @@ def friction_candidates(plant: Plant) -> Mapping[str, Gains]:
     if plant.modes.is_single:
         return {"closed-form": closed, "exact": closed}
 
+    target = exact.target_mode(plant.bare, plant.position, plant.modes)
+
     def ratio(alpha: float) -> float:
-        return exact.stable_ratio(exact.exact_friction(plant.bare, plant.position, plant.modes, alpha))
+        return exact.stable_ratio(target.equivalent(friction_stiffness(alpha)))
 
     best = exact.best_gain(ratio, limits.largest_friction(plant.modes)).gain
     if best >= limits.holding_friction(plant.modes):

@@ -56,9 +56,10 @@ def _candidates(plant: Plant) -> Mapping[str, Gains]:
     if plant.modes.is_single:
         return {"closed-form": Gains(alpha_n_m=closed), "exact": Gains(alpha_n_m=closed)}
 
+    target = exact.target_mode(plant.bare, plant.position, plant.modes)
+
     def ratio(g: float) -> float:
-        answer = exact.exact_equivalent(plant.bare, plant.position, plant.modes, complex(0.0, LOSS * g))
-        return exact.stable_ratio(answer)
+        return exact.stable_ratio(target.equivalent(complex(0.0, LOSS * g)))
 
     best = exact.best_gain(ratio, 4.0 * closed).gain
     holds = best >= plant.modes.modal_stiffness
