@@ -166,6 +166,8 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     if "network" in law.needs:
         raise UserError(where, law.name, "needs a network, which is trained for one damper", "choose another law")
     own = replace(options, mode=damper.mode, overrides={law.name: dict(damper.gains or {})})
+    if law.observer is None:
+        own = replace(own, weights=own.weights or Weights())  # they have no effect
     calibrated = None
     gains = Gains()
     try:

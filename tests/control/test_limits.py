@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import (
     CalibrationOptions,
+    _force_weight,
     balanced_weights,
     calibrate,
     needed_force,
@@ -254,25 +255,43 @@ def test_an_overdamped_mode_has_the_gain_of_critical_damping():
 @pytest.mark.parametrize(
     "weights", [{}, {"energy": 0.0, "top_displacement": 1e6}, {"energy": 3.0, "top_displacement": 400.0}]
 )
-def test_the_regulator_has_twice_the_damping_of_viscous_damping(weights):
-    """Two masses, so that the damper hardly acts on mode 1 and the damping ratios are small."""
-    frame = shear_frame([40.0, 5.0], [9e3, 9e4], 0.0)
-    position = np.array([-1.0, 1.0])
-    modes = limits.limiting_modes(frame, position)
-    found = calibrate(
-        frame, position, CalibrationOptions(weights=balanced_weights(modes, **weights)), [law_named("lqg")]
-    )
-    expected = 2.0 * limits.attainable_damping(modes)
-    assert expected < 0.03
-    assert found.laws["lqg"].damping_ratio_exact == pytest.approx(expected, rel=0.05)
+@pytest.mark.parametrize("inherent", [0.0, 0.03])
+def test_the_regulator_has_twice_the_damping_of_viscous_damping(weights, inherent):
+    """By complex eigenvalues, for dampers that hardly act on mode 1 and for dampers that overdamp it."""
+    for frame, position in (
+        (shear_frame([40.0, 5.0], [9e3, 9e4], inherent), np.array([-1.0, 1.0])),
+        (shear_frame([25.0] * 5, [3e4] * 5, inherent), np.eye(5)[0]),
+        (shear_frame([100.0] * 3, [1e4, 2e5, 2e5], inherent), np.eye(3)[0]),
+        (oscillator(), np.ones(1)),
+    ):
+        modes = limits.limiting_modes(frame, position)
+        options = CalibrationOptions(weights=balanced_weights(frame, position, modes, **weights))
+        found = calibrate(frame, position, options, [law_named("lqg"), law_named("vd")]).laws
+        expected = min(2.0 * found["vd"].damping_ratio_exact, np.sqrt(0.5))
+        assert found["lqg"].damping_ratio_exact == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.property
+def test_the_weight_of_a_damping_ratio_that_no_weight_reaches_has_the_largest_one():
+    """A ratio with its maximum of 0.3 at a weight of 1e-3, and the weight from either side of the start."""
+    tried = []
+
+    def ratio(weight):
+        tried.append(weight)
+        return 0.3 / np.cosh(0.5 * np.log(weight / 1e-3))
+
+    assert _force_weight(ratio, 0.5, 1.0) == pytest.approx(1e-3, rel=1e-2)
+    for start in (1e-2, 1.0, 100.0):
+        assert ratio(_force_weight(ratio, 0.1, start)) == pytest.approx(0.1, rel=1.1e-3)
+    assert len(tried) < 80
 
 
 @pytest.mark.golden
-def test_a_regulator_without_weights_is_refused(modes):
+def test_a_regulator_without_weights_is_refused(thesis_frame, floor_one, modes):
     with pytest.raises(
         UserError, match=r"^calibrate\.regulator: energy_weight: is 0, and so is top_displacement_weight"
     ):
-        balanced_weights(modes, energy=0.0)
+        balanced_weights(thesis_frame, floor_one, modes, energy=0.0)
 
 
 @pytest.mark.literature
