@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from mrpipe.control.calibration import CalibrationOptions, calibrate, plant_of
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
 from mrpipe.control.laws import all_laws, law_named
-from mrpipe.control.lqg import Weights
+from mrpipe.control.operation import forces_at
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import DamperModel
 from mrpipe.law_design.run import Result
@@ -256,10 +256,13 @@ def _rig(
         if "network" in law.needs:
             raise UserError("law", law.name, "needs a trained network", f"use mrpipe simulate --law {law.name}")
     position = floor_position(frame.floors, floor)
-    plant = plant_of(frame, position, CalibrationOptions())
+    plant, amplitude = plant_of(frame, position, CalibrationOptions()), EXPECTED_SHARE * damper.stroke_m
+    # as the stage calibrate does: default weights of the regulator are out of proportion for most structures
+    residual, _ = forces_at(damper, amplitude, plant.modes)
+    plant = replace(plant, weights=replace(plant.weights, force_noise_n=residual))
     known = [law for law in all_laws().values() if law in laws or law.name == "vd"]
-    calibration = calibrate(frame, position, CalibrationOptions(), known)
-    calibrated = calibrated_from(calibration, Weights(), damper, amplitude_m=EXPECTED_SHARE * damper.stroke_m)
+    calibration = calibrate(frame, position, CalibrationOptions(weights=plant.weights), known)
+    calibrated = calibrated_from(calibration, plant.weights, damper, amplitude_m=amplitude)
     factory = ControllerFactory(
         frame,
         damper,
