@@ -14,7 +14,7 @@ from mrpipe.control import exact, limits
 from mrpipe.control.calibration_settings import CalibrationSettings
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
-from mrpipe.control.laws import all_laws, law_named
+from mrpipe.control.laws import all_laws, law_named, law_names
 from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
@@ -111,6 +111,11 @@ class CalibrationOptions:
         Law -> gains (name -> value) that the user gives; the other gains are calibrated.
     weights
         Weights of the laws that are optimal regulators; None: :func:`balanced_weights` of the frame.
+
+    Raises
+    ------
+    UserError
+        If published gains are those of a law that does not exist, or the law has no such gain or another sign.
     """
 
     mode: int = _SETTINGS.target_mode
@@ -120,6 +125,15 @@ class CalibrationOptions:
     negative_stiffness_n_m: float | None = _SETTINGS.negative_stiffness_n_m
     overrides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     weights: Weights | None = None
+
+    def __post_init__(self) -> None:
+        for name, given in self.published.items():
+            if name not in law_names():
+                raise UserError("calibrate.published", name, "is not a control law", f"one of {', '.join(law_names())}")
+            try:
+                law_named(name).check_given(given)
+            except UserError as error:
+                raise UserError("calibrate.published", f"{name}.{error.where}", error.problem, error.remedy) from error
 
 
 LARGEST_REGULATED = 1.0 / np.sqrt(2.0)
@@ -331,7 +345,7 @@ def validity_warnings(
     limit = calibration.static_stiffness_n_m
     omega = calibration.modes.omega_0
     for law, item in calibration.laws.items():
-        negative = max(-item.gains.k_n_m, item.gains.alpha_n_m)
+        negative = law_named(law).negative_stiffness(item.gains)
         if negative > limit:
             said.append(
                 f"{law}: negative stiffness of {-negative:.0f} N/m is beyond the static limit of {-limit:.0f} N/m at "

@@ -138,7 +138,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     if w.shape != (n,) or not np.any(w):
         raise UserError("calibrate", "position", f"has {w.size} entries", f"{n} floors need {n}, not all zero")
     if not 1 <= mode <= n:
-        remedy = f"with {n} degrees of freedom and a locked damper it is 1 to {n - 1}"
+        remedy = f"with {n} degrees of freedom and a locked damper it is 1{f' to {n - 1}' if n > 2 else ''}"
         if n == 1:
             remedy = "with one degree of freedom it is 1"
         raise UserError("calibrate", "target_mode", f"is {mode}", remedy)

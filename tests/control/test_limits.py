@@ -114,6 +114,17 @@ def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one)
 
 
 @pytest.mark.property
+def test_only_laws_with_negative_stiffness_are_compared_with_the_static_limit(thesis_frame, floor_one):
+    """Friction in proportion to an extremum has none, however strong it is."""
+    laws = [law_named(name) for name in ("fdns", "homogeneous-friction")]
+    options = CalibrationOptions(overrides={law.name: {"alpha_n_m": 5000.0} for law in laws})
+    said = validity_warnings(
+        calibrate(thesis_frame, floor_one, options, laws), amplitude_m=0.01, residual_force_n=1.0, largest_force_n=1e6
+    )
+    assert [line.split(":")[0] for line in said if "static limit" in line] == ["fdns"]
+
+
+@pytest.mark.property
 def test_a_damper_that_hardly_acts_on_the_target_mode_is_reported(thesis_frame, floor_one, modes):
     assert limits.inherent_damping(thesis_frame, modes) < limits.attainable_damping(modes)
     assert limits.placement_warning(thesis_frame, modes) == ""
@@ -196,6 +207,18 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vdns": Gains(250.0, 4000.0)})),
             "law vdns needs a negative k_n_m",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vdd": {"c_n_s_m": 5.0}}),
+            "^calibrate.published: vdd: is not a control law; one of vd, vdps",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vd": {"c": 5.0}}),
+            "^calibrate.published: vd.c: law vd has no such gain; it has: c_n_s_m",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vd": {"c_n_s_m": -5.0}}),
+            "^calibrate.published: vd.c_n_s_m: is -5; law vd needs a positive c_n_s_m",
         ),
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vd": Gains(-1.0)})),

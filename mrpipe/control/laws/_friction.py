@@ -22,6 +22,7 @@ FRICTION = GainRange(
         0.05 * min(limits.optimal_friction(plant.modes), plant.static_stiffness_n_m),
         0.98 * plant.static_stiffness_n_m,
     ),
+    softens=True,
 )
 
 
