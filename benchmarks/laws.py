@@ -126,7 +126,7 @@ def ten_storey_rig(network: bool) -> Rig:
     calibration = calibrate(frame, model.devices[:, 0], CalibrationOptions())
     # as the stage calibrate does: default weights of the regulator would be out of proportion for this frame
     residual = float(damper.quasi_static_force(EXPECTED_M * first, 0.0))
-    weights = balanced_weights(calibration.modes, residual)
+    weights = balanced_weights(frame, model.devices[:, 0], calibration.modes, residual)
     trained = None
     if network:
         trained = reference(frame, calibration.laws["nnc"].gains.alpha_n_m, EXPECTED_M).network

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from mrpipe.control.calibration import CalibrationOptions, calibrate, plant_of
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
 from mrpipe.control.laws import all_laws, law_named
-from mrpipe.control.lqg import Weights
+from mrpipe.control.operation import forces_at
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import DamperModel
 from mrpipe.law_design.run import Result
@@ -217,11 +217,11 @@ def design(
     from mrpipe.law_design.results import design_as_json
     from mrpipe.law_design.run import load_of, run_design
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
-    from mrpipe.simulation.resonance import BAND
+    from mrpipe.simulation.resonance import band_of
 
     chosen = settings_of(DesignSettings, "design", {"laws": tuple(laws), **settings})
     rig, plant = _rig(_plain(frame), damper, floor, tuple(law_named(name) for name in ("vd", *laws)), None, {})
-    band = chosen.band_rad_s or (BAND[0] * plant.modes.omega_0, BAND[1] * plant.modes.omega_inf)
+    band = chosen.band_rad_s or band_of(plant.modes.omega_0, plant.modes.omega_inf)
     result = run_design(
         rig,
         plant,
@@ -256,10 +256,13 @@ def _rig(
         if "network" in law.needs:
             raise UserError("law", law.name, "needs a trained network", f"use mrpipe simulate --law {law.name}")
     position = floor_position(frame.floors, floor)
-    plant = plant_of(frame, position, CalibrationOptions())
+    plant, amplitude = plant_of(frame, position, CalibrationOptions()), EXPECTED_SHARE * damper.stroke_m
+    # as the stage calibrate does: default weights of the regulator are out of proportion for most structures
+    residual, _ = forces_at(damper, amplitude, plant.modes)
+    plant = replace(plant, weights=replace(plant.weights, force_noise_n=residual))
     known = [law for law in all_laws().values() if law in laws or law.name == "vd"]
-    calibration = calibrate(frame, position, CalibrationOptions(), known)
-    calibrated = calibrated_from(calibration, Weights(), damper, amplitude_m=EXPECTED_SHARE * damper.stroke_m)
+    calibration = calibrate(frame, position, CalibrationOptions(weights=plant.weights), known)
+    calibrated = calibrated_from(calibration, plant.weights, damper, amplitude_m=amplitude)
     factory = ControllerFactory(
         frame,
         damper,

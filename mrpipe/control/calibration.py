@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration_settings import CalibrationSettings
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
-from mrpipe.control.laws import all_laws, law_named
+from mrpipe.control.laws import all_laws, law_named, law_names
 from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
@@ -110,6 +111,11 @@ class CalibrationOptions:
         Law -> gains (name -> value) that the user gives; the other gains are calibrated.
     weights
         Weights of the laws that are optimal regulators; None: :func:`balanced_weights` of the frame.
+
+    Raises
+    ------
+    UserError
+        If published gains are those of a law that does not exist, or the law has no such gain or another sign.
     """
 
     mode: int = _SETTINGS.target_mode
@@ -120,17 +126,39 @@ class CalibrationOptions:
     overrides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     weights: Weights | None = None
 
+    def __post_init__(self) -> None:
+        for name, given in self.published.items():
+            if name not in law_names():
+                raise UserError("calibrate.published", name, "is not a control law", f"one of {', '.join(law_names())}")
+            try:
+                law_named(name).check_given(given)
+            except UserError as error:
+                raise UserError("calibrate.published", f"{name}.{error.where}", error.problem, error.remedy) from error
 
-def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0, **given: float) -> Weights:
+
+LARGEST_REGULATED = 1.0 / np.sqrt(2.0)
+"""Largest damping ratio for which the weight of the force is chosen: without resonance in the response to a force."""
+
+CHEAPEST = 1e-8
+"""Smallest weight of the force that is tried, relative to the estimate."""
+
+WEIGHT_TOLERANCE = 1e-3
+"""Relative tolerance of the damping ratio for which the weight of the force is chosen."""
+
+
+def balanced_weights(
+    frame: Frame, position: FloatArray, modes: limits.LimitingModes, residual_force_n: float = 0.0, **given: float
+) -> Weights:
     """Return weights whose regulator damps the target mode twice as much as optimal viscous damping does.
 
-    This is the damping before the damper clips the force. Consider an oscillator of unit mass on which the force u acts
-    through u_0. For the cost e (omega^2 q^2 + q'^2) + t (phi q)^2 + R u^2, with the amplitude phi of the mode at the
-    top, the regulator gives the damping ratio u_0/(2 omega) sqrt((2 e + t phi^2/omega^2)/R) if this ratio is small. R
-    follows from the attainable damping ratio, P2 (14).
+    Both damping ratios are exact: those of the complex eigenvalue of the structure without inherent damping, before
+    the damper clips the force. The target is at most :data:`LARGEST_REGULATED`. If no weight of the force reaches it,
+    the weight is the one of the largest damping ratio.
 
     Parameters
     ----------
+    frame, position
+        Structure and connectivity vector w of the damper, shape (n,).
     modes
         Limiting modes of the target.
     residual_force_n
@@ -143,14 +171,78 @@ def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0,
     UserError
         If energy and top displacement both have no weight.
     """
-    ratio = limits.attainable_damping(modes)
     energy, top = given.get("energy", 1.0), given.get("top_displacement", 0.0)
     if energy <= 0.0 and top <= 0.0:
         where, key = "calibrate.regulator", "energy_weight"
         raise UserError(where, key, "is 0, and so is top_displacement_weight", "give a positive weight to one of them")
-    weight = 2.0 * energy + top * (modes.top_0 / modes.omega_0) ** 2
-    force = weight * modes.u_0**2 / (16.0 * modes.omega_0**2 * ratio**2)
-    return Weights(**{"force": force, "force_noise_n": residual_force_n, **given})
+    weights = Weights(**{"force": 1.0, "force_noise_n": residual_force_n, **given})
+    if "force" in given:
+        return weights
+    target = exact.target_mode(exact.undamped(frame), position, modes)
+    viscous = exact.best_gain(
+        lambda c: exact.stable_ratio(target.linear(c, 0.0)), 4.0 * limits.optimal_viscosity(modes)
+    ).damping_ratio
+    wanted = min(2.0 * viscous, LARGEST_REGULATED)
+
+    def ratio(force: float) -> float:
+        gain = frame_regulator_gain(frame, position, replace(weights, force=force))
+        return exact.stable_ratio(target.feedback(gain))
+
+    return replace(weights, force=_force_weight(ratio, wanted, _estimated_force_weight(weights, modes, wanted)))
+
+
+def _estimated_force_weight(weights: Weights, modes: limits.LimitingModes, wanted: float) -> float:
+    """Return the weight of the force for a small damping ratio of a single mode without inherent damping [1/N^2].
+
+    For the cost e (omega^2 q^2 + q'^2) + t (phi q)^2 + R u^2 of an oscillator of unit mass, on which the force u acts
+    through u_0, the damping ratio is u_0/(2 omega) sqrt((2 e + t phi^2/omega^2)/R). phi is the amplitude of the mode at
+    the top.
+    """
+    cost = 2.0 * weights.energy + weights.top_displacement * (modes.top_0 / modes.omega_0) ** 2
+    return cost * modes.u_0**2 / (4.0 * modes.omega_0**2 * wanted**2)
+
+
+def _force_weight(ratio: Callable[[float], float], wanted: float, start: float) -> float:
+    """Return the largest weight of the force with a damping ratio; the one of the largest ratio if none reaches it.
+
+    The damping ratio rises with a smaller weight, at most until the poles come near to the zeros of the cost.
+    """
+    low, strong = start, ratio(start)
+    while strong >= wanted:
+        high, weak = 4.0 * low, ratio(4.0 * low)
+        if weak < wanted:
+            return _between(ratio, wanted, (high, weak), (low, strong))
+        low, strong = high, weak
+    high, weak = low, strong
+    while low > CHEAPEST * start:
+        low, strong = 0.25 * high, ratio(0.25 * high)
+        if strong >= wanted:
+            return _between(ratio, wanted, (high, weak), (low, strong))
+        if strong < weak:
+            break
+        high, weak = low, strong
+    bounds = (float(np.log(low)), float(np.log(4.0 * high)))
+    found = minimize_scalar(lambda x: -ratio(float(np.exp(x))), bounds=bounds, method="bounded")
+    return float(np.exp(found.x))
+
+
+def _between(
+    ratio: Callable[[float], float], wanted: float, weaker: tuple[float, float], stronger: tuple[float, float]
+) -> float:
+    """Return the weight of the force with a damping ratio, between two weights with their damping ratios.
+
+    The damping ratio is nearly a power of the weight.
+    """
+    (high, weak), (low, strong) = weaker, stronger
+    while strong > wanted * (1.0 + WEIGHT_TOLERANCE):
+        share = np.log(wanted / weak) / np.log(strong / weak) if weak > 0.0 else 0.5
+        middle = float(high * (low / high) ** min(max(share + 0.02, 0.05), 0.95))
+        found = ratio(middle)
+        if found < wanted:
+            high, weak = middle, found
+        else:
+            low, strong = middle, found
+    return low
 
 
 def calibrate(
@@ -199,18 +291,18 @@ def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) ->
         If the frame or the position allows no calibration.
     """
     modes, static = limits.limiting_modes(frame, position, options.mode), limits.static_stiffness(frame, position)
-    positive, negative = options.positive_stiffness_n_m, options.negative_stiffness_n_m
+    shares = {"vdps": POSITIVE_SHARE, "vdns": NEGATIVE_SHARE}
+    chosen = {"vdps": options.positive_stiffness_n_m, "vdns": options.negative_stiffness_n_m}
+    default = {law: shares[law] * static if k is None else k for law, k in chosen.items()}
     return Plant(
         frame=frame,
         bare=exact.undamped(frame),
         position=position,
         modes=modes,
         static_stiffness_n_m=static,
-        stiffness_n_m={
-            "vdps": POSITIVE_SHARE * static if positive is None else positive,
-            "vdns": NEGATIVE_SHARE * static if negative is None else negative,
-        },
-        weights=balanced_weights(modes) if options.weights is None else options.weights,
+        # c is calibrated for the stiffness with which the law runs, which the user may give as a gain
+        stiffness_n_m={law: options.overrides.get(law, {}).get("k_n_m", k) for law, k in default.items()},
+        weights=balanced_weights(frame, position, modes) if options.weights is None else options.weights,
     )
 
 
@@ -253,7 +345,7 @@ def validity_warnings(
     limit = calibration.static_stiffness_n_m
     omega = calibration.modes.omega_0
     for law, item in calibration.laws.items():
-        negative = max(-item.gains.k_n_m, item.gains.alpha_n_m)
+        negative = law_named(law).negative_stiffness(item.gains)
         if negative > limit:
             said.append(
                 f"{law}: negative stiffness of {-negative:.0f} N/m is beyond the static limit of {-limit:.0f} N/m at "

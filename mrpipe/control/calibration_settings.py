@@ -40,7 +40,7 @@ class RegulatorSettings(Section):
         None,
         gt=0.0,
         description="Weight of the damper force squared [1/N2]; null: such that the regulator, before the damper clips "
-        "it, gives the target mode twice the largest damping that viscous damping can give.",
+        "it, gives the target mode twice the largest damping ratio that viscous damping can give, at most 0.71.",
     )
     ground_noise_m_s2: float = Field(
         0.1, gt=0.0, description="Noise of the accelerometer of the ground, including model error."

@@ -38,12 +38,15 @@ class GainRange:
         Function from a plant to the smallest and the largest value in a search for the best gain.
     optional
         Whether the gain may be 0.
+    softens
+        Whether the gain is a negative stiffness of the device, whatever its sign.
     """
 
     name: str
     meaning: str
     bounds: Callable[[Plant], tuple[float, float]]
     optional: bool = False
+    softens: bool = False
 
 
 @dataclass(frozen=True)
@@ -238,6 +241,11 @@ class Law:
         if not self.tuned_gain:
             return gains
         return gains.changed(**{self.tuned_gain: factor * gains[self.tuned_gain]})
+
+    def negative_stiffness(self, gains: Gains) -> float:
+        """Return the negative stiffness of the device at these gains, as a positive number [N/m]; 0 if it has none."""
+        own = [gains[item.name] for item in self.gains if item.softens]
+        return max(-gains.k_n_m, *own, 0.0)
 
     def gains_as_json(self, gains: Gains) -> dict[str, float]:
         """Return name -> value of the gains that the law has; the names end in units."""

@@ -47,9 +47,11 @@ class LimitingModes:
     mode
         Number of the target mode, from 1.
     omega_0, omega_inf
-        Angular frequency with the damper free (4.4) and locked [rad/s].
+        Angular frequency with the damper free (4.4) and locked [rad/s]; omega_inf is infinite if the target is the
+        only mode that moves the damper, as in a structure with one degree of freedom.
     shape_0, shape_inf
-        Mode shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the damper does not move in the locked shape.
+        Mode shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the damper does not move in the locked shape,
+        which is zero if omega_inf is infinite.
     u_0
         Amplitude of the free mode at the damper [1/sqrt(kg)].
     kappa
@@ -78,9 +80,28 @@ class LimitingModes:
         return modal_flexibility(self)
 
     @property
+    def is_single(self) -> bool:
+        """Whether the target is the only mode that moves the damper, so that a locked damper leaves no motion."""
+        return math.isinf(self.omega_inf)
+
+    @property
+    def modal_stiffness(self) -> float:
+        """Stiffness omega_0^2/u_0^2 of the free mode at the damper [N/m]; for one degree of freedom the stiffness."""
+        return (self.omega_0 / self.u_0) ** 2
+
+    @property
     def share_p2(self) -> float:
         """(omega_inf - omega_0)/(omega_inf + omega_0) of P2 (7) [1]."""
-        return (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
+        return 1.0 if self.is_single else (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
+
+
+def highest_frequency(omega_0: float, omega_inf: float) -> float:
+    """Return the angular frequency up to which a device can raise that of its target mode [rad/s].
+
+    It is omega_inf. If this is infinite, it is twice omega_0, which needs a device with three times the stiffness of
+    the structure.
+    """
+    return 2.0 * omega_0 if math.isinf(omega_inf) else omega_inf
 
 
 SAME_FREQUENCY = 1e-6
@@ -95,7 +116,8 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
 
     The locked problem is that on the subspace w'x = 0. The locked mode that belongs to the target is the one of the
     same number: locking raises each frequency to at most the next one. Modes that do not move the damper, such as those
-    across its direction, are the same in both problems and are not counted.
+    across its direction, are the same in both problems and are not counted. If only one mode moves the damper, the
+    locked frequency is infinite.
 
     Parameters
     ----------
@@ -115,11 +137,10 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     w = np.asarray(position, dtype=np.float64)
     if w.shape != (n,) or not np.any(w):
         raise UserError("calibrate", "position", f"has {w.size} entries", f"{n} floors need {n}, not all zero")
-    if n < 2:
-        problem = "of a structure with one degree of freedom does not exist: a locked damper leaves no motion"
-        raise UserError("calibrate", "target_mode", problem, "give a structure with at least two degrees of freedom")
-    if not 1 <= mode <= n - 1:
-        remedy = f"with {n} degrees of freedom and a locked damper it is 1 to {n - 1}"
+    if not 1 <= mode <= n:
+        remedy = f"with {n} degrees of freedom and a locked damper it is 1{f' to {n - 1}' if n > 2 else ''}"
+        if n == 1:
+            remedy = "with one degree of freedom it is 1"
         raise UserError("calibrate", "target_mode", f"is {mode}", remedy)
     M = 0.5 * (frame.mass + frame.mass.T)
     K = 0.5 * (frame.stiffness + frame.stiffness.T)
@@ -136,6 +157,10 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
         raise UserError(
             "calibrate", "place of the damper", problem, f"choose another place, or a target mode among {listed}"
         )
+    shape_0 = shapes[:, mode - 1] * (1.0 if shapes[frame.top, mode - 1] >= 0.0 else -1.0)
+    u_0, omega_0 = float(w @ shape_0), math.sqrt(squared[mode - 1])
+    if moving == [mode]:
+        return LimitingModes(mode, omega_0, math.inf, shape_0, np.zeros(n), u_0, 0.0, frame.top)
     if len(moving) == n:
         basis = null_space(w[None, :])
     else:
@@ -146,13 +171,11 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     if partner >= locked_squared.size:
         problem = f"mode {mode} is the last one that moves the damper, so that it has no locked partner"
         raise UserError("calibrate", "target_mode", problem, f"choose one of {', '.join(map(str, moving[:-1][:6]))}")
-    shape_0 = shapes[:, mode - 1] * (1.0 if shapes[frame.top, mode - 1] >= 0.0 else -1.0)
     shape_inf = basis @ locked[:, partner]
     kappa = float(shape_inf @ M @ shape_0)
     if kappa < 0.0:
         shape_inf, kappa = -shape_inf, -kappa
-    u_0 = float(w @ shape_0)
-    omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[partner])
+    omega_inf = math.sqrt(locked_squared[partner])
     if omega_inf - omega_0 < 1e-6 * omega_0:
         raise UserError("calibrate", "place of the damper", f"mode {mode} does not move it", "choose another place")
     return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa, frame.top)
@@ -203,27 +226,48 @@ def static_stiffness(frame: Frame, position: FloatArray) -> float:
     return float(1.0 / (position @ np.linalg.solve(frame.stiffness, position)))
 
 
-# --- closed forms ---
+# --- closed forms; for a single mode those of an oscillator of mass 1/u_0^2 ---
 
 
 def damping_estimate(modes: LimitingModes, stiffness: float, loss: float) -> float:
-    """Return zeta of P2 (7) for a device with Re H = `stiffness`, Im H = `loss` [N/m]."""
+    """Return zeta of P2 (7) for a device with Re H = `stiffness`, Im H = `loss` [N/m].
+
+    For a single mode of modal stiffness k_0 it is loss/(2 (k_0 + stiffness)), which is the dissipated energy of a cycle
+    over 4 pi times the strain energy. It is NaN if the stiffness is not positive.
+    """
+    if modes.is_single:
+        whole = modes.modal_stiffness + stiffness
+        return loss / (2.0 * whole) if whole > 0.0 else math.nan
     real, imaginary = modes.nu * stiffness, modes.nu * loss
     return modes.share_p2 * 2.0 * imaginary / ((1.0 + real) ** 2 + imaginary**2)
 
 
 def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of P2 (13), with the factor 1/omega_0 that is missing in print (errata row 12)."""
-    return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
+    """Return c [N s/m] of P2 (13), with the factor 1/omega_0 that is missing in print (errata row 12).
+
+    For a single mode it is c of critical damping, 2 sqrt((k_0 + stiffness)/u_0^2).
+
+    Raises
+    ------
+    UserError
+        If the damper moves a single mode, and its stiffness is not above minus that of the structure.
+    """
+    if not modes.is_single:
+        return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
+    whole = modes.modal_stiffness + stiffness
+    if whole <= 0.0:
+        problem = f"is {stiffness:.4g} N/m, so that the structure has no stiffness with the damper"
+        raise UserError("calibrate", "negative_stiffness_n_m", problem, f"above {-modes.modal_stiffness:.4g} N/m")
+    return 2.0 * math.sqrt(whole) / abs(modes.u_0)
 
 
-def optimal_viscosity_thesis(modes: TwoLimits, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of (4.13) and (4.16), with omega_inf + omega_0 instead of 2 omega_0."""
+def optimal_viscosity_thesis(modes: LimitingModes | TwoLimits, stiffness: float = 0.0) -> float:
+    """Return c [N s/m] of (4.13) and (4.16), with omega_inf + omega_0 instead of 2 omega_0; infinite omega_inf: inf."""
     return 2.0 * (modes.omega_inf - modes.omega_0) / modes.u_0**2 + stiffness / modes.omega_0
 
 
 def attainable_damping(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return zeta_max of P2 (14)."""
+    """Return zeta_max of P2 (14); 1, critical damping, for a single mode."""
     return modes.share_p2 / (1.0 + modes.nu * stiffness)
 
 
@@ -250,13 +294,41 @@ def placement_warning(frame: Frame, modes: LimitingModes) -> str:
     )
 
 
-def optimal_friction(modes: TwoLimits) -> float:
-    """Return alpha [N/m] of (4.25), P2 (20)."""
+def optimal_friction(modes: LimitingModes | TwoLimits) -> float:
+    """Return alpha [N/m] of (4.25), P2 (20); for a single mode, whose equivalent has no optimum, the critical alpha."""
+    if math.isinf(modes.omega_inf):
+        return critical_friction(modes)
     return 1.0 / (modal_flexibility(modes) * math.hypot(1.0, FRICTION_RATIO))
 
 
+def critical_friction(modes: TwoLimits) -> float:
+    """Return alpha [N/m] with which a free vibration of the target mode ends after half a cycle: a third of k_0.
+
+    From an extremum X a mode of modal stiffness k_0 = omega_0^2/u_0^2 moves about alpha X/(k_0 - alpha) with the
+    stiffness k_0 - alpha, so that the next extremum is -X (k_0 - 3 alpha)/(k_0 - alpha).
+    """
+    return (modes.omega_0 / modes.u_0) ** 2 / 3.0
+
+
+def holding_friction(modes: TwoLimits) -> float:
+    """Return alpha [N/m] from which the friction holds the target mode at its extremum: half of k_0.
+
+    The force 2 alpha X is then as large as the restoring force k_0 X. The equivalent (4.24) assumes a harmonic motion,
+    so that it does not hold beyond this alpha.
+    """
+    return 0.5 * (modes.omega_0 / modes.u_0) ** 2
+
+
+def largest_friction(modes: LimitingModes) -> float:
+    """Return the largest alpha [N/m] of a search or a diagram: 2/nu; for a single mode its modal stiffness."""
+    return modes.modal_stiffness if modes.is_single else 2.0 / modes.nu
+
+
 def attainable_damping_friction(modes: LimitingModes) -> float:
-    """Return zeta_max of P2 (21)."""
+    """Return zeta_max of P2 (21); for a single mode the estimate at the optimal alpha."""
+    if modes.is_single:
+        alpha = optimal_friction(modes)
+        return damping_estimate(modes, -alpha, FRICTION_RATIO * alpha)
     return modes.share_p2 * FRICTION_RATIO / (math.hypot(1.0, FRICTION_RATIO) - 1.0)
 
 

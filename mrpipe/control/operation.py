@@ -94,6 +94,6 @@ def operation_of(
     warnings += placed_warnings(item, amplitude_m=amplitude_m, residual_force_n=residual, largest_force_n=largest)
     return PlacedOperation(
         damper_as_json(item, amplitude_m, residual, rounding_share * speed),
-        balanced_weights(item.modes, residual, **regulator.known()),
+        balanced_weights(frame, item.damper.position, item.modes, residual, **regulator.known()),
         tuple(warnings),
     )

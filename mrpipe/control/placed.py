@@ -22,7 +22,7 @@ from mrpipe.control.calibration import (
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
 from mrpipe.control.laws import law_named
-from mrpipe.control.limits import LimitingModes
+from mrpipe.control.limits import LimitingModes, critical_friction
 from mrpipe.control.lqg import Weights
 from mrpipe.control.together import LinearDevice, TogetherDamping, damping_together, linear_device
 from mrpipe.errors import UserError
@@ -139,12 +139,12 @@ def calibrate_placed(
         found = (item.device(values) for item, values in zip(alone, gains, strict=True))
         return [item for item in found if item is not None]
 
-    start = np.ones(len(places))
-    reference = np.maximum(damping_together(bare, devices(start), modes).damping_ratios, 1e-6)
-    factors = _largest(
-        lambda tried: float(np.min(damping_together(bare, devices(tried), modes).damping_ratios / reference)),
-        len(places),
-    )
+    def ratios(factors: FloatArray) -> FloatArray:
+        return damping_together(bare, devices(factors), modes).damping_ratios
+
+    reference = np.maximum(ratios(np.ones(len(places))), 1e-6)
+    largest = np.array([_largest_factor(alone[place], alone[place].alone) for place in places])
+    factors = _best_factors(ratios, reference, largest)
     result = list(alone)
     for place, factor in zip(places, factors, strict=True):
         item = alone[place]
@@ -166,6 +166,8 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     if "network" in law.needs:
         raise UserError(where, law.name, "needs a network, which is trained for one damper", "choose another law")
     own = replace(options, mode=damper.mode, overrides={law.name: dict(damper.gains or {})})
+    if law.observer is None:
+        own = replace(own, weights=own.weights or Weights())  # they have no effect
     calibrated = None
     gains = Gains()
     try:
@@ -184,11 +186,12 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
         return found
 
     # the calibration of a single law does not account for a brace or for gains that the user gives
-    def ratio(factors: FloatArray) -> float:
+    def ratio(factors: FloatArray) -> FloatArray:
         device = found.device(law.scaled(gains, float(factors[0])))
-        return float(damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios[0])
+        return damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios
 
-    best = law.scaled(gains, float(_largest(ratio, 1)[0]))
+    factors = _best_factors(ratio, np.ones(1), np.array([_largest_factor(found, gains)]))
+    best = law.scaled(gains, float(factors[0]))
     return replace(found, alone=best, together=best)
 
 
@@ -199,18 +202,46 @@ def _is_tunable(item: PlacedCalibration) -> bool:
     return bool(law.tuned_gain) and law.tuned_gain not in given and item.device(item.alone) is not None
 
 
-def _largest(value: Callable[[FloatArray], float], count: int) -> FloatArray:
-    """Return the factors, shape (count,), within 1/LARGEST_FACTOR to LARGEST_FACTOR, of the largest value."""
-    limit = math.log(LARGEST_FACTOR)
+def _largest_factor(item: PlacedCalibration, gains: Gains) -> float:
+    """Return the largest factor on the tuned gain of a damper.
+
+    Friction with negative stiffness must not hold the structure at its extremum, which its equivalent does not show.
+    """
+    if law_named(item.damper.law).tuned_gain != "alpha_n_m":
+        return LARGEST_FACTOR
+    return min(LARGEST_FACTOR, max(1.0, critical_friction(item.modes) / gains.alpha_n_m))
+
+
+def _best_factors(ratios: Callable[[FloatArray], FloatArray], reference: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return the factors, shape (m,), of the largest damping.
+
+    If all target modes can be overdamped, these are the smallest factors, in the ratio that was found, that damp all of
+    them critically, as for a single damper.
+
+    Parameters
+    ----------
+    ratios
+        Function from factors, shape (m,), to the damping ratios of the target modes, shape (k,).
+    reference
+        Damping ratios to which these are compared, shape (k,); the smallest quotient is maximised.
+    largest
+        Largest factors, shape (m,); the smallest ones are 1/LARGEST_FACTOR.
+    """
+    count = largest.size
+    low, high = -math.log(LARGEST_FACTOR), np.log(largest)
     simplex = np.vstack([np.zeros(count), 0.4 * np.eye(count)])
+    simplex[simplex > high] *= -1.0
     found = minimize(
-        lambda logarithms: -value(np.exp(logarithms)),
+        lambda logarithms: -float(np.min(ratios(np.exp(logarithms)) / reference)),
         np.zeros(count),
         method="Nelder-Mead",
-        bounds=[(-limit, limit)] * count,
+        bounds=[(low, float(item)) for item in high],
         options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9, "maxfev": 150 * count},
     )
-    return np.asarray(np.exp(found.x))
+    factors = np.asarray(np.exp(found.x))
+    if float(np.min(ratios(factors))) < exact.CRITICAL:
+        return factors
+    return factors * exact.first_critical(lambda share: float(np.min(ratios(share * factors))), 0.0, 1.0)
 
 
 def placed_warnings(

@@ -149,7 +149,7 @@ def damper_as_json(
         "brace_stiffness_n_m": finite(item.damper.brace_n_m),
         "target_mode": item.damper.mode,
         "omega_0": item.modes.omega_0,
-        "omega_inf": item.modes.omega_inf,
+        "omega_inf": finite(item.modes.omega_inf),
         "static_stiffness_n_m": item.static_stiffness_n_m,
         "gains_alone": law.gains_as_json(item.alone),
         "gains": law.gains_as_json(item.together),
@@ -199,7 +199,7 @@ def read_placed(artifact: Artifact) -> list[KnownDamper]:
             name=row["name"],
             law=row["law"],
             brace_n_m=row["brace_stiffness_n_m"] or math.inf,
-            omega_inf=row["omega_inf"],
+            omega_inf=row["omega_inf"] or math.inf,
             calibrated=Calibrated(
                 position=np.array(row["position"]),
                 omega_0=row["omega_0"],

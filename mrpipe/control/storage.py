@@ -41,7 +41,7 @@ def calibration_to_json(calibration: Calibration) -> dict[str, Any]:
     return {
         "target_mode": modes.mode,
         "omega_0": modes.omega_0,
-        "omega_inf": modes.omega_inf,
+        "omega_inf": finite(modes.omega_inf),
         "nu": modes.nu,
         "u_0": modes.u_0,
         "kappa": modes.kappa,

@@ -224,6 +224,7 @@ def _source(controller: Controller, law: Law, prefix: str) -> str:
     )
     layout = ", ".join(str(int(value)) for value in controller.layout)
     macros = "\n".join(f"#define {name} {getattr(kernel, name)}" for name in (*_INNER_MACROS, *_MACROS))
+    macros += f"\n#define OBSERVER_SIZE {max(1, 2 * int(controller.layout[kernel.FLOORS]))}"
     text = _TEMPLATE.read_text(encoding="utf-8")
     for key, value in {
         "@PREFIX@": prefix,

@@ -40,8 +40,9 @@ def describe(
     """
 
     modes = calibration.modes
+    locked = "no motion" if modes.is_single else f"{modes.omega_inf:.3f} rad/s"
     sink.text(
-        f"Mode {modes.mode}: {modes.omega_0:.3f} rad/s free, {modes.omega_inf:.3f} rad/s with the damper locked, modal "
+        f"Mode {modes.mode}: {modes.omega_0:.3f} rad/s free, {locked} with the damper locked, modal "
         f"flexibility {modes.nu:.4g} m/N, static stiffness at the damper {calibration.static_stiffness_n_m:.0f} N/m."
     )
     rows = [
@@ -70,11 +71,16 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
     c = np.linspace(optimum / points, 2.0 * optimum, points)
     k = np.linspace(-1.1 * calibration.static_stiffness_n_m, calibration.static_stiffness_n_m, points)
     laws = calibration.laws
-    over_c = np.array([exact.exact_damping(bare, position, modes, float(value), 0.0).damping_ratio for value in c])
+    target = exact.target_mode(bare, position, modes)
+    over_c = np.array([target.linear(float(value), 0.0).damping_ratio for value in c])
     estimate = np.array([limits.damping_estimate(modes, 0.0, value * modes.omega_0) for value in c])
-    marks = {"vd as run": (laws["vd"].gains.c_n_s_m, laws["vd"].damping_ratio_exact)}
-    sink.figure("viscosity", figures.damping_over_gain(c, over_c, estimate, marks, "c [N s/m]"), "Viscous damping.")
-    alpha = np.linspace(1.5 / modes.nu / points, 1.5 / modes.nu, points)
+    sink.figure(
+        "viscosity",
+        figures.damping_over_gain(c, over_c, estimate, _mark(calibration, "vd"), "c [N s/m]"),
+        "Viscous damping.",
+    )
+    largest = 0.75 * limits.largest_friction(modes)
+    alpha = np.linspace(largest / points, largest, points)
     H = [friction_stiffness(float(value)) for value in alpha]
     sink.figure(
         "friction",
@@ -82,7 +88,7 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
             alpha,
             exact.friction_map(bare, position, modes, alpha),
             np.array([limits.damping_estimate(modes, item.real, item.imag) for item in H]),
-            {"fdns as run": (laws["fdns"].gains.alpha_n_m, laws["fdns"].damping_ratio_exact)},
+            _mark(calibration, "fdns"),
             "alpha [N/m]",
         ),
         "Friction with negative stiffness, by its equivalent.",
@@ -98,6 +104,14 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
         ),
         "Exact damping over viscosity and stiffness of an unclipped device; white: statically unstable.",
     )
+
+
+def _mark(calibration: Calibration, law: str) -> dict[str, tuple[float, float]]:
+    """Return gain and damping ratio with which a law runs, under its name in figures; empty if it was left out."""
+    if law not in calibration.laws:
+        return {}
+    item = calibration.laws[law]
+    return {f"{law} as run": (item.gains[law_named(law).gain_names[0]], item.damping_ratio_exact)}
 
 
 def _loops(sink: Sink, calibration: Calibration, amplitude_m: float) -> None:

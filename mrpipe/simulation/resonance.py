@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import Artifact, Progress
 from mrpipe.control.controller import Controller
+from mrpipe.control.limits import highest_frequency
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.inputs import ground_amplitude
@@ -73,8 +74,13 @@ class Curves:
 
 def default_band(calibration: Artifact) -> tuple[float, float]:
     """Return the band around the free and the locked frequency of the calibrated mode [rad/s]."""
+    return band_of(calibration.scalar("omega_0"), calibration.scalar("omega_inf"))
+
+
+def band_of(omega_0: float, omega_inf: float) -> tuple[float, float]:
+    """Return the band around the free and the locked frequency of a mode [rad/s]; the locked one may be infinite."""
     low, high = BAND
-    return low * calibration.scalar("omega_0"), high * calibration.scalar("omega_inf")
+    return low * omega_0, high * highest_frequency(omega_0, omega_inf)
 
 
 def curve_options(settings: ResonanceSettings, *, absolute: bool) -> CurveOptions:

@@ -12,6 +12,7 @@ from mrpipe.control.assembly import ControllerFactory
 from mrpipe.control.central import CENTRAL, CentralRegulator, Sensors, central_regulator
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
+from mrpipe.control.limits import highest_frequency
 from mrpipe.control.placed import CENTRAL_LAW
 from mrpipe.control.placed_storage import KnownDamper, accelerometers_of, read_placed
 from mrpipe.control.settings import ControllerSettings
@@ -286,5 +287,5 @@ def dampers_band(rig: DampersRig) -> tuple[float, float]:
     known = [item.known for item in rig.dampers]
     return (
         BAND[0] * min(item.calibrated.omega_0 for item in known),
-        BAND[1] * max(item.omega_inf for item in known),
+        BAND[1] * max(highest_frequency(item.calibrated.omega_0, item.omega_inf) for item in known),
     )

@@ -42,7 +42,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     if amplitude is None:
         amplitude = expected_amplitude(damper, _tested(context), modes)
     residual, largest = forces_at(damper, amplitude, modes)
-    weights = balanced_weights(modes, residual, **settings.regulator.known())
+    weights = balanced_weights(frame, position, modes, residual, **settings.regulator.known())
     calibration = calibrate(frame, position, _options(settings, weights))
     if hardly := placement_warning(frame, modes):
         context.warn(hardly)

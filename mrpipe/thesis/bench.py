@@ -118,7 +118,7 @@ def bench_of_sets(frame: Frame) -> Bench:
             negative_stiffness_n_m=printed_gains()["vdns"]["k_n_m"],
         ),
     )
-    weights = balanced_weights(limiting_modes(frame, position))
+    weights = balanced_weights(frame, position, limiting_modes(frame, position))
     settings = ControllerSettings(inverse="model", residual_force_n=SWITCH_N)
     calibrated = calibrated_from(calibration, weights, damper, amplitude_m=9.3e-3)
     rig = Rig(frame, damper, ControllerFactory(frame, damper, calibrated, settings), LoopOptions())

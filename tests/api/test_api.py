@@ -11,8 +11,12 @@ import numpy as np
 import pytest
 
 import mrpipe
+from mrpipe.api.loop import _rig
 from mrpipe.artifacts import ArtifactWriter, Provenance, load_parameter_set
 from mrpipe.control.gains import Gains
+from mrpipe.control.laws import law_named
+from mrpipe.control.laws._regulator import regulator_assessment
+from mrpipe.control.lqg import frame_regulator_gain
 from mrpipe.dampers.model import damper_from_parameter_set, write_damper
 from mrpipe.effects.library import damper_effects
 from mrpipe.errors import UserError
@@ -75,6 +79,22 @@ def test_a_loop_from_objects_in_memory() -> None:
     assert off.indices["rms_x_top_m"] > 2.0 * loop.indices["rms_x_top_m"]
     with pytest.raises(UserError, match="network"):
         mrpipe.simulate(frame, damper, law="nnc")
+
+
+@pytest.mark.property
+def test_the_regulator_suits_the_structure():
+    """Default weights had been out of proportion for every structure but a small one."""
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    damping = []
+    for size in (1.0, 1e3):
+        rig, plant = _rig(
+            shear_frame([25.0 * size] * 3, [3e4 * size] * 3, 0.01), damper, 1, (law_named("lqg"),), None, {}
+        )
+        weights = rig.controllers.calibrated.weights
+        assert weights == plant.weights and weights.force_noise_n > 0.0
+        found = regulator_assessment(plant, frame_regulator_gain(plant.frame, plant.position, weights))
+        damping.append(found.damping_ratio_exact)
+    assert damping[0] == pytest.approx(damping[1], rel=5e-3)
 
 
 @pytest.mark.property

@@ -33,7 +33,7 @@ def write_artifacts(folder: Path, settings: StructureSettings = TWO) -> dict[str
     """Write frame.h5 and control.h5 as the stages do and return stage -> artifact."""
     found = calibrate_placed(FRAME, placed_dampers(FRAME, settings.dampers, 1), CalibrationOptions())
     rows = [damper_as_json(item, AMPLITUDE_M, RESIDUAL_N, 0.01) for item in found]
-    weights = [balanced_weights(item.modes, RESIDUAL_N) for item in found]
+    weights = [balanced_weights(FRAME, item.damper.position, item.modes, RESIDUAL_N) for item in found]
     together = together_as_json(FRAME, modes_together(FRAME, found, [1, 2]), [1, 2])
     with ArtifactWriter.create(folder / "frame.h5", Provenance("identify-frame")) as artifact:
         write_frame(artifact, FRAME)

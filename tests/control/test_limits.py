@@ -9,9 +9,11 @@ from scipy.linalg import block_diag
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import (
     CalibrationOptions,
+    _force_weight,
     balanced_weights,
     calibrate,
     needed_force,
+    plant_of,
     validity_warnings,
 )
 from mrpipe.control.gains import Gains
@@ -112,6 +114,17 @@ def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one)
 
 
 @pytest.mark.property
+def test_only_laws_with_negative_stiffness_are_compared_with_the_static_limit(thesis_frame, floor_one):
+    """Friction in proportion to an extremum has none, however strong it is."""
+    laws = [law_named(name) for name in ("fdns", "homogeneous-friction")]
+    options = CalibrationOptions(overrides={law.name: {"alpha_n_m": 5000.0} for law in laws})
+    said = validity_warnings(
+        calibrate(thesis_frame, floor_one, options, laws), amplitude_m=0.01, residual_force_n=1.0, largest_force_n=1e6
+    )
+    assert [line.split(":")[0] for line in said if "static limit" in line] == ["fdns"]
+
+
+@pytest.mark.property
 def test_a_damper_that_hardly_acts_on_the_target_mode_is_reported(thesis_frame, floor_one, modes):
     assert limits.inherent_damping(thesis_frame, modes) < limits.attainable_damping(modes)
     assert limits.placement_warning(thesis_frame, modes) == ""
@@ -156,14 +169,30 @@ def test_any_mode_and_any_position(floors, mode, floor):
         assert answer.damping_ratio == pytest.approx(added, rel=2e-3)
 
 
+MASS, STIFFNESS = 100.0, 6400.0
+
+
+def oscillator():
+    return shear_frame([MASS], [STIFFNESS], 0.0)
+
+
+def optimal_viscosity_of_an_oscillator(stiffness):
+    return limits.optimal_viscosity(limits.limiting_modes(oscillator(), np.ones(1)), stiffness)
+
+
 @pytest.mark.golden
 def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
     cases = [
-        (lambda: limits.limiting_modes(thesis_frame, floor_one, 5), "mode: is 5"),
+        (lambda: limits.limiting_modes(thesis_frame, floor_one, 5), "mode 5 is the last one that moves the damper"),
+        (lambda: limits.limiting_modes(thesis_frame, floor_one, 6), "mode: is 6; with 5 .* 1 to 4"),
         (lambda: limits.limiting_modes(thesis_frame, np.zeros(5)), "not all zero"),
         (
-            lambda: limits.limiting_modes(Frame(np.eye(1), np.zeros((1, 1)), np.eye(1)), np.ones(1)),
-            "one degree of freedom",
+            lambda: limits.limiting_modes(Frame(np.eye(1), np.zeros((1, 1)), np.eye(1)), np.ones(1), 2),
+            "with one degree of freedom it is 1",
+        ),
+        (
+            lambda: optimal_viscosity_of_an_oscillator(-7000.0),
+            "negative_stiffness_n_m: is -7000 N/m, so that the structure has no stiffness with the damper; above -6400",
         ),
         (
             lambda: limits.limiting_modes(
@@ -178,6 +207,18 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vdns": Gains(250.0, 4000.0)})),
             "law vdns needs a negative k_n_m",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vdd": {"c_n_s_m": 5.0}}),
+            "^calibrate.published: vdd: is not a control law; one of vd, vdps",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vd": {"c": 5.0}}),
+            "^calibrate.published: vd.c: law vd has no such gain; it has: c_n_s_m",
+        ),
+        (
+            lambda: CalibrationOptions(published={"vd": {"c_n_s_m": -5.0}}),
+            "^calibrate.published: vd.c_n_s_m: is -5; law vd needs a positive c_n_s_m",
         ),
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vd": Gains(-1.0)})),
@@ -237,22 +278,139 @@ def test_an_overdamped_mode_has_the_gain_of_critical_damping():
 @pytest.mark.parametrize(
     "weights", [{}, {"energy": 0.0, "top_displacement": 1e6}, {"energy": 3.0, "top_displacement": 400.0}]
 )
-def test_the_regulator_has_twice_the_damping_of_viscous_damping(weights):
-    """Two masses, so that the damper hardly acts on mode 1 and the damping ratios are small."""
-    frame = shear_frame([40.0, 5.0], [9e3, 9e4], 0.0)
-    position = np.array([-1.0, 1.0])
-    modes = limits.limiting_modes(frame, position)
-    found = calibrate(
-        frame, position, CalibrationOptions(weights=balanced_weights(modes, **weights)), [law_named("lqg")]
-    )
-    expected = 2.0 * limits.attainable_damping(modes)
-    assert expected < 0.03
-    assert found.laws["lqg"].damping_ratio_exact == pytest.approx(expected, rel=0.05)
+@pytest.mark.parametrize("inherent", [0.0, 0.03])
+def test_the_regulator_has_twice_the_damping_of_viscous_damping(weights, inherent):
+    """By complex eigenvalues, for dampers that hardly act on mode 1 and for dampers that overdamp it."""
+    for frame, position in (
+        (shear_frame([40.0, 5.0], [9e3, 9e4], inherent), np.array([-1.0, 1.0])),
+        (shear_frame([25.0] * 5, [3e4] * 5, inherent), np.eye(5)[0]),
+        (shear_frame([100.0] * 3, [1e4, 2e5, 2e5], inherent), np.eye(3)[0]),
+        (oscillator(), np.ones(1)),
+    ):
+        modes = limits.limiting_modes(frame, position)
+        options = CalibrationOptions(weights=balanced_weights(frame, position, modes, **weights))
+        found = calibrate(frame, position, options, [law_named("lqg"), law_named("vd")]).laws
+        expected = min(2.0 * found["vd"].damping_ratio_exact, np.sqrt(0.5))
+        assert found["lqg"].damping_ratio_exact == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.property
+def test_the_weight_of_a_damping_ratio_that_no_weight_reaches_has_the_largest_one():
+    """A ratio with its maximum of 0.3 at a weight of 1e-3, and the weight from either side of the start."""
+    tried = []
+
+    def ratio(weight):
+        tried.append(weight)
+        return 0.3 / np.cosh(0.5 * np.log(weight / 1e-3))
+
+    assert _force_weight(ratio, 0.5, 1.0) == pytest.approx(1e-3, rel=1e-2)
+    for start in (1e-2, 1.0, 100.0):
+        assert ratio(_force_weight(ratio, 0.1, start)) == pytest.approx(0.1, rel=1.1e-3)
+    assert len(tried) < 80
 
 
 @pytest.mark.golden
-def test_a_regulator_without_weights_is_refused(modes):
+def test_a_regulator_without_weights_is_refused(thesis_frame, floor_one, modes):
     with pytest.raises(
         UserError, match=r"^calibrate\.regulator: energy_weight: is 0, and so is top_displacement_weight"
     ):
-        balanced_weights(modes, energy=0.0)
+        balanced_weights(thesis_frame, floor_one, modes, energy=0.0)
+
+
+@pytest.mark.literature
+def test_one_degree_of_freedom_has_the_gains_of_the_textbook():
+    """Critical damping is 2 sqrt(m (k_0 + k)); the energy of a cycle gives the damping ratio of a weaker device."""
+    modes = limits.limiting_modes(oscillator(), np.ones(1))
+    assert (modes.omega_0, modes.omega_inf, modes.nu) == (pytest.approx(8.0), np.inf, 0.0)
+    assert modes.modal_stiffness == pytest.approx(STIFFNESS)
+    found = calibrate(oscillator(), np.ones(1), CalibrationOptions())
+    assert set(found.skipped) == {"lyapunov"}  # no inherent damping
+    for law, share in (("vd", 0.0), ("vdps", 0.5), ("vdns", -0.8)):
+        gains = found.laws[law].gains
+        assert gains.k_n_m == pytest.approx(share * STIFFNESS)
+        assert gains.c_n_s_m == pytest.approx(2.0 * np.sqrt(MASS * (1.0 + share) * STIFFNESS), rel=1e-6)
+        assert found.laws[law].damping_ratio_exact == pytest.approx(1.0, abs=1e-8)
+        assert found.laws[law].candidates["closed-form"].c_n_s_m == pytest.approx(gains.c_n_s_m, rel=1e-6)
+    assert found.laws["sky-hook"].gains.c_n_s_m == pytest.approx(1600.0, rel=1e-6)
+    weak = CalibrationOptions(overrides={"vd": {"c_n_s_m": 80.0}, "vdps": {"c_n_s_m": 80.0, "k_n_m": 3600.0}})
+    found = calibrate(oscillator(), np.ones(1), weak)
+    assert found.laws["vd"].damping_ratio_estimate == pytest.approx(0.05, rel=1e-6)
+    assert found.laws["vd"].damping_ratio_exact == pytest.approx(0.05, rel=1e-9)
+    assert found.laws["vdps"].damping_ratio_exact == pytest.approx(0.04, rel=1e-9)
+
+
+def extrema(force, count=6):
+    """Extrema of a free vibration of the oscillator from 1 m, integrated over half cycles with small steps."""
+    x, v, last, found = 1.0, 0.0, 1.0, []
+    side, step = -1.0, 2e-5
+    for _ in range(200_000):
+        a = -(STIFFNESS * x + force(x, side, last)) / MASS
+        if v == 0.0 and a * side <= 0.0:
+            return found  # held
+        v += step * a
+        x += step * v
+        if v * side < 0.0:
+            v, side, last = 0.0, -side, abs(x)
+            found.append(x)
+            if len(found) == count:
+                break
+    return found
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(
+    "law,force",
+    [
+        ("fdns", lambda x, side, last, g: g * (side * last - x)),
+        ("homogeneous-friction", lambda x, side, last, g: g * side * last),
+    ],
+)
+def test_friction_ends_the_free_vibration_of_one_degree_of_freedom_in_half_a_cycle(law, force):
+    gain = calibrate(oscillator(), np.ones(1), CalibrationOptions()).laws[law].gains.alpha_n_m
+    remaining = {
+        share: abs(extrema(lambda x, side, last, g=share * gain: force(x, side, last, g), 1)[0])
+        for share in (0.5, 0.9, 1.0, 1.1)
+    }
+    assert remaining[1.0] < 1e-3 < 0.05 < remaining[0.9] < remaining[0.5]
+    assert remaining[1.1] > 0.05
+    held = 1.001 * {"fdns": 1.5, "homogeneous-friction": 2.0}[law] * gain
+    assert extrema(lambda x, side, last: force(x, side, last, held)) == []
+
+
+@pytest.mark.property
+def test_friction_does_not_hold_an_isolated_structure(thesis_frame):
+    """The equivalent of fdns has its optimum at several times the stiffness of the isolation, where nothing moves."""
+    isolated = shear_frame([100.0] * 3, [1e4, 2e5, 2e5], 0.02)
+    for frame, place in ((isolated, np.eye(3)[0]), (thesis_frame, np.eye(5)[1])):
+        modes = limits.limiting_modes(frame, place)
+        laws = [law_named(name) for name in ("fdns", "fdns-bounded", "homogeneous-friction")]
+        options = CalibrationOptions()
+        found = calibrate(frame, place, options, laws).laws
+        for name in ("fdns", "fdns-bounded"):
+            assert found[name].gains.alpha_n_m == pytest.approx(modes.modal_stiffness / 3.0)
+        assert found["homogeneous-friction"].gains.alpha_n_m < modes.modal_stiffness
+        for law in laws:
+            low, high = law.gains[0].bounds(plant_of(frame, place, options))
+            assert low < 0.5 * found[law.name].gains.alpha_n_m < 1.5 * found[law.name].gains.alpha_n_m < high
+
+
+@pytest.mark.property
+def test_a_single_mode_among_others_is_that_of_one_degree_of_freedom():
+    """A damper along x of a mass that the springs do not couple to y."""
+    frame = Frame(MASS * np.eye(2), np.zeros((2, 2)), np.diag([4.0 * STIFFNESS, STIFFNESS]))
+    with pytest.raises(UserError, match="mode 1 does not move the damper"):
+        limits.limiting_modes(frame, np.array([1.0, 0.0]), 1)
+    found = calibrate(frame, np.array([1.0, 0.0]), CalibrationOptions(mode=2), [law_named("vd")])
+    assert found.laws["vd"].gains.c_n_s_m == pytest.approx(3200.0, rel=1e-6)
+
+
+@pytest.mark.property
+def test_viscosity_is_calibrated_for_the_stiffness_that_is_given(thesis_frame, floor_one):
+    given, default = (
+        calibrate(thesis_frame, floor_one, item, [law_named("vdns")]).laws["vdns"].gains
+        for item in (
+            CalibrationOptions(overrides={"vdns": {"k_n_m": -2000.0}}),
+            CalibrationOptions(negative_stiffness_n_m=-2000.0),
+        )
+    )
+    assert given == default

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mrpipe.control import kernel
+from mrpipe.control.laws._regulator import observe
 from mrpipe.control.lqg import Weights, frame_observer_gain, frame_regulator_gain, lqg_observer, state_weight
 from mrpipe.errors import UserError
 from mrpipe.signals.discretisation import discretise_zero_order
@@ -92,3 +94,23 @@ def test_amplitudes_of_modes_have_no_accelerometer(thesis_frame):
     assert np.all(observer.innovation[:, 4:] == 0.0)
     assert np.all(np.any(observer.innovation[:, :4] != 0.0, axis=0))
     assert np.max(np.abs(np.linalg.eigvals(observer.transition))) < 1.0
+
+
+@pytest.mark.oracle
+def test_the_observer_of_a_large_structure_stays_within_its_memory():
+    """The estimate of 280 states had been held in an array of 256."""
+    floors, rng = 140, np.random.default_rng(2)
+    n, outputs = 2 * floors, floors + 2
+    F, g, H, k = (rng.standard_normal(shape) for shape in ((n, n), (n,), (n, outputs), (n,)))
+    numbers = np.concatenate([F.ravel(), g, H.ravel(), k])
+    layout = np.zeros(64, dtype=np.int64)
+    layout[kernel.FLOORS] = floors
+    state, measured = rng.standard_normal(n), rng.standard_normal(kernel.MEASURED_FLOORS + floors)
+    y = np.concatenate(
+        [measured[[kernel.MEASURED_DISPLACEMENT, kernel.MEASURED_GROUND]], measured[kernel.MEASURED_FLOORS :]]
+    )
+    expected = F @ state + 3.0 * g + H @ y
+    # the function before it is compiled checks the bounds of its arrays
+    force = observe.py_func(numbers, layout, state, measured, 3.0)
+    np.testing.assert_allclose(state, expected, rtol=1e-9, atol=1e-9)
+    assert force == pytest.approx(-k @ expected, rel=1e-9)

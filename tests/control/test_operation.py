@@ -41,7 +41,7 @@ def test_the_force_without_drive_is_that_at_the_expected_amplitude() -> None:
     assert found.summary["expected_amplitude_m"] == AMPLITUDE_M
     assert found.summary["residual_force_n"] == pytest.approx(18.0, rel=1e-3)
     assert found.summary["friction_rounding_m_s"] == pytest.approx(0.05 * AMPLITUDE_M * item.modes.omega_0)
-    assert found.weights == balanced_weights(item.modes, found.summary["residual_force_n"])
+    assert found.weights == balanced_weights(FRAME, item.damper.position, item.modes, found.summary["residual_force_n"])
 
 
 def test_a_damper_of_another_mode_gives_a_warning() -> None:

@@ -107,3 +107,18 @@ def test_a_given_gain_stays_and_a_brace_changes_the_best_gain() -> None:
 def test_a_law_with_a_network_is_refused() -> None:
     with pytest.raises(UserError, match="network"):
         calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "nnc")], CalibrationOptions())
+
+
+@pytest.mark.literature
+def test_two_dampers_of_one_degree_of_freedom_damp_it_critically_together() -> None:
+    mass, stiffness = 100.0, 6400.0
+    frame, place = shear_frame([mass], [stiffness], 0.0), np.ones(1)
+    critical = 2.0 * math.sqrt(mass * stiffness)
+    viscous = [PlacedDamper("left", place, "vd"), PlacedDamper("right", place, "vd")]
+    found = calibrate_placed(frame, viscous, CalibrationOptions())
+    assert [item.alone.c_n_s_m for item in found] == pytest.approx([critical, critical], rel=1e-6)
+    assert sum(item.together.c_n_s_m for item in found) == pytest.approx(critical, rel=1e-6)
+    # the damping of the equivalent grows without limit, but a third of the stiffness ends a vibration in half a cycle
+    friction = [PlacedDamper("left", place, "fdns"), PlacedDamper("right", place, "vd", gains={"c_n_s_m": 80.0})]
+    found = calibrate_placed(frame, friction, CalibrationOptions())
+    assert found[0].together.alpha_n_m <= stiffness / 3.0 * (1.0 + 1e-9)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_continuous_lyapunov, sqrtm
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
@@ -179,3 +179,32 @@ def test_a_direction_that_does_not_move_the_places_is_left_out() -> None:
     # a structure that the ground does not move has the error of its response to forces
     still = replace(both, influence=both.influence_y, influence_y=None)
     assert 0.0 < guyan(still, KEPT, 4.0).error < 1.0
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("coordinates", [3, 5, 8])
+def test_a_balanced_structure_is_within_the_bound_of_balanced_truncation(coordinates: int) -> None:
+    """The bound is twice the sum of the Hankel singular values that a square-root truncation of the states leaves out.
+
+    Inputs are the ground motion and a force on the first floor, each with the same static energy; the output is the
+    displacement of this floor.
+    """
+    n = FRAME.floors
+    reduced = balanced_structure(FRAME, (0,), coordinates, None)
+    loads = np.column_stack([FRAME.mass @ np.ones(n), np.eye(n)[0]])
+    loads /= np.sqrt(np.einsum("ni,ni->i", loads, np.linalg.solve(FRAME.stiffness, loads)))
+    space = state_space(FRAME, loads)
+    inputs, output = space.B[:, 1:], np.eye(2 * n)[:1]
+    reachable = solve_continuous_lyapunov(space.A, -inputs @ inputs.T)
+    observable = solve_continuous_lyapunov(space.A.T, -output.T @ output)
+    hankel = np.linalg.svd(np.real(sqrtm(reachable) @ sqrtm(observable)), compute_uv=False)
+    small, basis = reduced.frame, reduced.basis
+
+    def response(omega: float) -> float:
+        full = np.linalg.solve(1j * omega * np.eye(2 * n) - space.A, inputs.astype(complex))[0]
+        dynamic = small.stiffness + 1j * omega * small.damping - omega**2 * small.mass
+        return float(np.linalg.norm(full - basis[0] @ np.linalg.solve(dynamic, basis.T @ loads.astype(complex))))
+
+    omega = natural_modes(FRAME).angular_frequencies
+    lines = np.concatenate([omega, natural_modes(small).angular_frequencies, np.linspace(1.0, 1.2 * omega[-1], 400)])
+    assert max(response(float(line)) for line in lines) < 2.0 * np.sum(hankel[2 * coordinates :])

@@ -18,7 +18,11 @@ from mrpipe.control.linearisation import friction_stiffness
 FRICTION = GainRange(
     "alpha_n_m",
     "friction with negative stiffness",
-    lambda plant: (0.05 * limits.optimal_friction(plant.modes), 0.98 * plant.static_stiffness_n_m),
+    lambda plant: (
+        0.05 * min(limits.optimal_friction(plant.modes), plant.static_stiffness_n_m),
+        0.98 * plant.static_stiffness_n_m,
+    ),
+    softens=True,
 )
 
 
@@ -41,16 +45,24 @@ C_BODY = """\
 
 
 def friction_candidates(plant: Plant) -> Mapping[str, Gains]:
-    """Return alpha by closed form (4.25), P2 (20), and for the largest exact damping of the equivalent."""
+    """Return alpha by closed form (4.25), P2 (20), and for the largest exact damping of the equivalent.
+
+    The equivalent can have its optimum where the friction would hold the structure at its extremum, or no optimum at
+    all. The exact alpha is then the one with which a free vibration ends after half a cycle.
+    """
+    closed = Gains(alpha_n_m=limits.optimal_friction(plant.modes))
+    if plant.modes.is_single:
+        return {"closed-form": closed, "exact": closed}
+
+    target = exact.target_mode(plant.bare, plant.position, plant.modes)
 
     def ratio(alpha: float) -> float:
-        return exact.stable_ratio(exact.exact_friction(plant.bare, plant.position, plant.modes, alpha))
+        return exact.stable_ratio(target.equivalent(friction_stiffness(alpha)))
 
-    best = exact.best_gain(ratio, 2.0 / plant.modes.nu)
-    return {
-        "closed-form": Gains(alpha_n_m=limits.optimal_friction(plant.modes)),
-        "exact": Gains(alpha_n_m=best.gain),
-    }
+    best = exact.best_gain(ratio, limits.largest_friction(plant.modes)).gain
+    if best >= limits.holding_friction(plant.modes):
+        best = limits.critical_friction(plant.modes)
+    return {"closed-form": closed, "exact": Gains(alpha_n_m=best)}
 
 
 def friction_assessment(plant: Plant, gains: Gains) -> Assessment:

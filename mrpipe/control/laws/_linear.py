@@ -42,20 +42,19 @@ def _scale(plant: Plant) -> float:
 def linear_candidates(plant: Plant, k: float) -> Mapping[str, Gains]:
     """Return c by closed form (P2 and thesis) and for the largest exact damping, at a given stiffness k [N/m]."""
     modes = plant.modes
+    closed, target = limits.optimal_viscosity(modes, k), exact.target_mode(plant.bare, plant.position, modes)
 
     def ratio(c: float) -> float:
-        if k < 0.0:
+        # the equivalent of the clipped law does not show that a single mode can be damped critically
+        if k < 0.0 and not modes.is_single:
             # unclipped negative stiffness can make the structure unstable, so the clipped law is optimised
             H = clipped_linear_stiffness(c, k, modes.omega_0)
-            return exact.stable_ratio(exact.exact_equivalent(plant.bare, plant.position, modes, H))
-        return exact.stable_ratio(exact.exact_damping(plant.bare, plant.position, modes, c, k))
+            return exact.stable_ratio(target.equivalent(H))
+        return exact.stable_ratio(target.linear(c, k))
 
     best = exact.best_gain(ratio, 4.0 * limits.optimal_viscosity(modes))
-    return {
-        "closed-form": Gains(limits.optimal_viscosity(modes, k), k),
-        "closed-form-thesis": Gains(limits.optimal_viscosity_thesis(modes, k), k),
-        "exact": Gains(best.gain, k),
-    }
+    thesis = {} if modes.is_single else {"closed-form-thesis": Gains(limits.optimal_viscosity_thesis(modes, k), k)}
+    return {"closed-form": Gains(closed, k), **thesis, "exact": Gains(best.gain, k)}
 
 
 def linear_assessment(plant: Plant, gains: Gains) -> Assessment:

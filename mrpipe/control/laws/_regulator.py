@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64, int64, njit
-from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control import exact
-from mrpipe.control.following import followed_pole
 from mrpipe.control.kernel import (
     AT_OBSERVER,
     FLOORS,
@@ -18,10 +16,8 @@ from mrpipe.control.kernel import (
     MEASURED_GROUND,
     S_FORCE,
     STATE_OBSERVER,
-    WIDEST,
 )
 from mrpipe.control.law import Assessment, Plant
-from mrpipe.structures import StateSpace, state_space
 
 
 @njit(float64(float64[::1], int64[::1], float64[::1], float64[::1], float64), cache=True)
@@ -37,7 +33,7 @@ def observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: 
     at_h = at_g + n
     at_k = at_h + n * outputs
     at = layout[STATE_OBSERVER]
-    new = np.zeros(WIDEST)
+    new = np.zeros(n)
     for row in range(n):
         total = numbers[at_g + row] * force + numbers[at_h + row * outputs] * measured[MEASURED_DISPLACEMENT]
         for column in range(n):
@@ -65,7 +61,7 @@ static double observe(double *state, const double *measured, double force)
     const int floors = layout[FLOORS], n = 2 * floors, outputs = floors + 2;
     const double *f = numbers + layout[AT_OBSERVER], *g = f + n * n, *h = g + n, *k = h + n * outputs;
     double *z = state + layout[STATE_OBSERVER];
-    double fresh[WIDEST] = {0.0}, answer = 0.0;
+    double fresh[OBSERVER_SIZE] = {0.0}, answer = 0.0;
     for (int row = 0; row < n; ++row) {
         double total = g[row] * force + h[row * outputs] * measured[MEASURED_DISPLACEMENT];
         for (int column = 0; column < n; ++column) total += f[row * n + column] * z[column];
@@ -87,19 +83,9 @@ C_BODY = "    return observe(state, measured, state[S_FORCE]);\n"
 
 def regulator_assessment(plant: Plant, gain: FloatArray) -> Assessment:
     """Follow the pole of the target mode while the unclipped u = -k z, shape (2n,), increases from zero."""
-    answers = []
-    for item in (plant.bare, plant.frame):
-        space = state_space(item, plant.position)
-
-        def upper(share: float, space: StateSpace = space) -> NDArray[np.complex128]:
-            poles = np.asarray(np.linalg.eigvals(space.A - share * np.outer(space.B[:, 1], gain)), dtype=np.complex128)
-            return poles[poles.imag >= -1e-9]
-
-        start, shape = complex(0.0, plant.modes.omega_0), plant.modes.shape_0
-        equivalent = complex(gain @ np.concatenate([shape, start * shape])) / plant.modes.u_0
-        pole = followed_pole(upper, start, exact.pole_slope(plant.modes, equivalent))
-        answers.append(exact.ExactDamping(pole, float(np.max(upper(1.0).real))))
-    without, with_frame = answers
+    without, with_frame = (
+        exact.target_mode(item, plant.position, plant.modes).feedback(gain) for item in (plant.bare, plant.frame)
+    )
     return Assessment(
         damping_ratio_exact=without.damping_ratio,
         damping_ratio_with_frame=with_frame.damping_ratio,

@@ -26,18 +26,44 @@ def homogeneous_friction(numbers: FloatArray, layout: IntArray, state: FloatArra
     return 0.0
 
 
+def _closed_form(plant: Plant) -> float:
+    """Return g [N/m] with the loss 1/nu; for a single mode, which has no optimal loss, the critical g."""
+    modes = plant.modes
+    return _critical(plant) if modes.is_single else 1.0 / (LOSS * modes.nu)
+
+
+def _critical(plant: Plant) -> float:
+    """Return g [N/m] with which a free vibration of the target mode ends after half a cycle: half of k_0.
+
+    From an extremum X a mode of modal stiffness k_0 moves about g X/k_0, so that the next extremum is -X (1 - 2 g/k_0).
+    A g of k_0 or more holds it at its extremum.
+    """
+    return 0.5 * plant.modes.modal_stiffness
+
+
+def _scale(plant: Plant) -> float:
+    """Return the middle of the search for g [N/m]: the closed form, at most the g that holds the mode."""
+    return min(_closed_form(plant), plant.modes.modal_stiffness)
+
+
 def _candidates(plant: Plant) -> Mapping[str, Gains]:
-    """Return g with the optimal equivalent loss: by closed form, where the loss is 1/nu, and by complex eigenvalue."""
+    """Return g with the optimal equivalent loss: by closed form, where the loss is 1/nu, and by complex eigenvalue.
+
+    The optimum may be where the friction would hold the target mode at its extremum, or there may be none. The exact g
+    is then the one with which a free vibration ends after half a cycle.
+    """
+    closed, critical = _closed_form(plant), _critical(plant)
+    if plant.modes.is_single:
+        return {"closed-form": Gains(alpha_n_m=closed), "exact": Gains(alpha_n_m=closed)}
+
+    target = exact.target_mode(plant.bare, plant.position, plant.modes)
 
     def ratio(g: float) -> float:
-        answer = exact.exact_equivalent(plant.bare, plant.position, plant.modes, complex(0.0, LOSS * g))
-        return exact.stable_ratio(answer)
+        return exact.stable_ratio(target.equivalent(complex(0.0, LOSS * g)))
 
-    closed = 1.0 / (LOSS * plant.modes.nu)
-    return {
-        "closed-form": Gains(alpha_n_m=closed),
-        "exact": Gains(alpha_n_m=exact.best_gain(ratio, 4.0 * closed).gain),
-    }
+    best = exact.best_gain(ratio, 4.0 * closed).gain
+    holds = best >= plant.modes.modal_stiffness
+    return {"closed-form": Gains(alpha_n_m=closed), "exact": Gains(alpha_n_m=critical if holds else best)}
 
 
 def _assess(plant: Plant, gains: Gains) -> Assessment:
@@ -68,7 +94,7 @@ LAW = Law(
         GainRange(
             "alpha_n_m",
             "friction force over the last extremum",
-            lambda plant: (0.05 / (LOSS * plant.modes.nu), 4.0 / (LOSS * plant.modes.nu)),
+            lambda plant: (0.05 * _scale(plant), 4.0 * _scale(plant)),
         ),
     ),
     signs={"alpha_n_m": 1.0},
