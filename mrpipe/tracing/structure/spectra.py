@@ -43,6 +43,28 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Weighting:
+    """Linear frame by which the noise of the sensors is propagated to the equations of the storeys.
+
+    Attributes
+    ----------
+    stiffness
+        Shear of each storey per floor displacement, shape (n, n) [N/m].
+    ground
+        Shear of each storey per ground acceleration, and per its second derivative over the square of the highest
+        angular frequency in use, shape (n, 2) [kg]; zero for a frame whose modes are all in the band.
+    """
+
+    stiffness: FloatArray
+    ground: FloatArray
+
+    @classmethod
+    def without_ground(cls, stiffness: FloatArray) -> Weighting:
+        """Return the weighting of a frame whose forces depend on the displacements alone."""
+        return cls(stiffness, np.zeros((len(stiffness), 2)))
+
+
+@dataclass(frozen=True)
 class Motion:
     """Motion of a record in time, relative to the ground; shape (m, n), SI.
 
@@ -240,12 +262,46 @@ def storey_sums(floors: int) -> FloatArray:
     return np.triu(np.ones((floors, floors)))
 
 
+def gains_of_floors(
+    weighting: Weighting, masses: FloatArray, frequencies_hz: FloatArray, lasers: FloatArray
+) -> FloatArray:
+    """Return the error of each storey's equation per error of each floor's accelerometer, shape (n, n, b) [kg].
+
+    The accelerometer of a floor enters the inertia of the storeys below it and, integrated twice, the displacement.
+
+    Parameters
+    ----------
+    weighting
+        Linear frame by which errors are propagated.
+    masses
+        Floor masses, shape (n,) [kg].
+    frequencies_hz
+        Frequencies of the lines, shape (b,).
+    lasers
+        Share of each displacement that comes from a displacement sensor, shape (n, b).
+    """
+    inverse = (1.0 - lasers) / (2.0 * np.pi * frequencies_hz) ** 2
+    inertia = storey_sums(len(masses))[:, :, None] * masses[None, :, None]
+    return np.asarray(inertia - weighting.stiffness[:, :, None] * inverse)
+
+
+def gains_of_ground(weighting: Weighting, frequencies_hz: FloatArray, lasers: FloatArray) -> FloatArray:
+    """Return the error of each storey's equation per error of the ground's accelerometer, shape (n, b) [kg].
+
+    The displacements are relative to the ground, so that its error enters all of them.
+    """
+    omega = 2.0 * np.pi * frequencies_hz
+    relative = np.einsum("sl,lb->sb", weighting.stiffness, (1.0 - lasers) / omega**2)
+    direct = weighting.ground[:, :1] - weighting.ground[:, 1:] * omega**2 / omega[-1] ** 2
+    return np.asarray(relative - direct)
+
+
 def spectra_of(
     record: FrameRecord,
     masses: FloatArray,
     band: Band,
     noise: Noise,
-    stiffness: FloatArray,
+    weighting: Weighting,
     motion: Motion,
     rules: FrameRules | None = None,
 ) -> Spectra:
@@ -261,8 +317,8 @@ def spectra_of(
         Frequencies in use.
     noise
         Noise of the sensors.
-    stiffness
-        Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
+    weighting
+        Linear frame by which the noise is propagated; used for the weights only.
     motion
         Motion of the record in the time domain.
     rules
@@ -287,13 +343,11 @@ def spectra_of(
             parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
     target = spectrum_of(shear, taper, dt, frequencies)
     lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
-    inverse = (1.0 - lasers) / omega**2
-    by_floor = sums[:, :, None] * masses[None, :, None] - stiffness[:, :, None] * inverse
-    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
     sensors = noise.of_accelerometers(frequencies)
-    variance = np.einsum("slb,lb->sb", by_floor**2, sensors[1:])
-    variance += sensors[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
-    variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
+    variance = np.einsum("slb,lb->sb", gains_of_floors(weighting, masses, frequencies, lasers) ** 2, sensors[1:])
+    variance += sensors[0] * gains_of_ground(weighting, frequencies, lasers) ** 2
+    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
+    variance += np.einsum("sl,lb->sb", weighting.stiffness**2, of_lasers)
     # the noise of a load cell enters the equation of every storey below the load
     for floor, density in noise.loads.items():
         variance[:floor] += density

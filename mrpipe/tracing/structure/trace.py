@@ -16,6 +16,7 @@ from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
+from mrpipe.tracing.structure.exchange import exchanged_floors
 from mrpipe.tracing.structure.fault_search import likely_fault
 from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.groups import groups_of
@@ -112,11 +113,13 @@ def trace_frame(
     problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg, frame_rules)
     _require_length(problem, data)
     progress(0.2, "spectra")
+    exchange = exchanged_floors(problem)
     selection = select(
-        problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
-    )
+        problem, effects, rules, most=0 if exchange else most, declared=declared, rng=rng, draws=draws, jobs=jobs,
+        progress=progress,
+    )  # fmt: skip
     about = selection.about
-    fault = _sensor_fault(problem, selection, rules)
+    fault = exchange or _sensor_fault(problem, selection, rules)
     reason = _because_of(fault) if fault else _unnamed(selection, rules)
     chosen = selection.chosen[: selection.declared] if reason else selection.chosen
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
@@ -128,6 +131,9 @@ def trace_frame(
         between = replace(between, kind="constant", change=0.0, step_before="", storey=0)
     differing = differing_tests(after, problem, selection.groups.scale, problem.rules.differing_floors)
     summary = _summary(problem, selection, before, after, between, declared, rules, reason, differing)
+    if exchange:
+        # a linear frame fits the exchanged floors as well, so that the residual may be noise
+        summary |= Verdict("unknown", reason).sentence_as_json()
     summary["frame"]["sensor_fault"] = fault.as_json() if fault else None
     return FrameTracing(summary, problem, selection, before, after, between)
 
@@ -150,6 +156,9 @@ def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: Namin
 
 
 def _because_of(fault: SensorFault) -> str:
+    if fault.exchanged_with and not fault.test:
+        why = "the displacement of the lowest mode grows from floor to floor only in this order"
+        return f"{fault.sentence()}: {why}; correct the channels, and trace again"
     return f"{fault.sentence()}, which explains what is missing; correct the channel, and trace again"
 
 

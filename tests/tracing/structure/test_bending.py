@@ -1,0 +1,60 @@
+"""Towers that are not shear frames: band, weights and noise of a general linear frame."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from mrpipe.tracing.structure.base import FrameProblem, frame_problem
+from mrpipe.tracing.structure.bending import bounded, natural_frequencies
+from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.sensor_noise import noise_of
+from mrpipe.tracing.structure.spectra import Weighting, storey_sums
+from tests.tracing.structure.towers import MASSES, RATE, stiffness_of, tower_records
+
+
+@functools.cache
+def _problem(kind: str) -> FrameProblem:
+    records = tower_records(kind)
+    return frame_problem(records[:2], records[2:], MASSES)
+
+
+@pytest.mark.planted
+def test_the_residual_of_a_wall_is_noise_in_a_band_that_contains_its_modes() -> None:
+    """With band and weights of a shear frame, the residual of a bending wall exceeds the noise."""
+    problem = _problem("wall")
+    design = design_of("linear-frame", problem.training)
+    assert problem.bends and not groups_of(design).material(design.residual)
+    # the third mode lies within the excitation of up to 30 Hz, or just above it
+    second = float(np.sqrt(linalg.eigh(stiffness_of("wall"), np.diag(MASSES), eigvals_only=True)[1]) / 2.0 / np.pi)
+    assert problem.band.low_hz < 2.5 and problem.band.high_hz > 1.3 * second
+
+
+@pytest.mark.planted
+def test_a_shear_frame_keeps_band_and_weights_of_its_storeys() -> None:
+    problem = _problem("shear")
+    assert not problem.bends and not np.any(problem.weighting.ground)
+
+
+@pytest.mark.property
+def test_the_natural_frequencies_of_a_linear_frame_come_out() -> None:
+    stiffness = stiffness_of("wall and frame")
+    expected = np.sqrt(linalg.eigh(stiffness, np.diag(MASSES), eigvals_only=True)) / 2.0 / np.pi
+    weighting = Weighting.without_ground(storey_sums(len(MASSES)) @ stiffness)
+    assert natural_frequencies(weighting, MASSES) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.property
+def test_noise_that_was_taken_too_large_is_lowered_to_the_residual() -> None:
+    problem = _problem("shear")
+    record = problem.training[0]
+    true = noise_of(record.record, problem.band.high_hz)
+    loud = true.acceleration.copy()
+    loud[2] *= 25.0
+    found = bounded(problem.training[0], type(true)(loud, {}, {}, 0.0, RATE), MASSES)
+    assert found.acceleration[2] < 6.0 * true.acceleration[2]
+    assert np.all(found.acceleration >= 0.5 * true.acceleration)
