@@ -54,7 +54,7 @@ def exchanged_floors(problem: FrameProblem) -> SensorFault | None:
 
 
 def shape_of_lowest_mode(record: Spectra) -> FloatArray:
-    """Return the displacements of the floors at the strongest resonance of a record, shape (n,), with the largest one 1.
+    """Return the displacements of the floors at the strongest resonance of a record over the largest one, shape (n,).
 
     The displacement of a structure is largest in its lowest mode.
     """

@@ -17,9 +17,7 @@ from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.exchange import exchanged_floors
-from mrpipe.tracing.structure.fault_search import likely_fault
-from mrpipe.tracing.structure.fit import design_of
-from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.fault_and_effect import fault_alone, fault_and_effect
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
 from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests, in_words
@@ -27,7 +25,6 @@ from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.rounds import FrameCandidate, FrameSelection
 from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import select
-from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, NamedEffect, Unexplained, Verdict
 from mrpipe.words import listed
@@ -114,13 +111,20 @@ def trace_frame(
     _require_length(problem, data)
     progress(0.2, "spectra")
     exchange = exchanged_floors(problem)
-    selection = select(
-        problem, effects, rules, most=0 if exchange else most, declared=declared, rng=rng, draws=draws, jobs=jobs,
-        progress=progress,
-    )  # fmt: skip
+
+    def choose(given: FrameProblem) -> FrameSelection:
+        return select(
+            given, effects, rules, most=0 if exchange else most, declared=declared, rng=rng, draws=draws, jobs=jobs,
+            progress=progress,
+        )  # fmt: skip
+
+    selection = choose(problem)
+    fault = exchange or fault_alone(problem, selection, rules)
+    reason = fault.reason() if fault else _unnamed(selection, rules)
+    both = None if fault else fault_and_effect(problem, selection, rules, choose)
+    if both:
+        fault, problem, selection, reason = both.fault, both.problem, both.selection, ""
     about = selection.about
-    fault = exchange or _sensor_fault(problem, selection, rules)
-    reason = _because_of(fault) if fault else _unnamed(selection, rules)
     chosen = selection.chosen[: selection.declared] if reason else selection.chosen
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
     after = model_of(selection.design, chosen, about)
@@ -134,32 +138,10 @@ def trace_frame(
     if exchange:
         # a linear frame fits the exchanged floors as well, so that the residual may be noise
         summary |= Verdict("unknown", reason).sentence_as_json()
+    if both:
+        summary = both.in_summary(summary, problem.rules)
     summary["frame"]["sensor_fault"] = fault.as_json() if fault else None
     return FrameTracing(summary, problem, selection, before, after, between)
-
-
-def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
-    """Return the fault of a sensor that leaves nothing unexplained, where effects leave something."""
-    if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
-        return None
-    design = design_of("linear-frame", problem.training)
-    fault = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
-    if fault is None:
-        return None
-    # the noise was estimated with the faulty sensor: fit the repaired records again
-    training, validation = (
-        [repaired(item.record, fault) for item in items] for items in (problem.training, problem.validation)
-    )
-    again = frame_problem(training, validation, problem.masses_kg, problem.rules)
-    design = design_of("linear-frame", again.training)
-    return None if groups_of(design, problem.rules).material(design.residual) else fault
-
-
-def _because_of(fault: SensorFault) -> str:
-    if fault.exchanged_with and not fault.test:
-        why = "the displacement of the lowest mode grows from floor to floor only in this order"
-        return f"{fault.sentence()}: {why}; correct the channels, and trace again"
-    return f"{fault.sentence()}, which explains what is missing; correct the channel, and trace again"
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:
