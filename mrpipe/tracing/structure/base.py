@@ -104,7 +104,7 @@ def frame_problem(
         Decision thresholds; their defaults if None.
     """
     rules = rules or FrameRules()
-    n = len(masses)
+    n, turns = len(masses), training[0].turns
     band = _band_of_power(training)
     storey = np.full(n, float(np.mean(masses)) * (2.0 * np.pi * np.sqrt(band.low_hz * band.high_hz)) ** 2)
     frequencies = np.zeros(n)
@@ -112,14 +112,22 @@ def frame_problem(
     few = _few(training)
     limit = min(OF_RATE * item.rate_hz for item in training)
     for _ in range(3):
-        spectra = _spectra(few, masses, band, _shear(storey), rules)
+        spectra = _spectra(few, masses, band, _shear(storey, turns), rules)
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
         band = Band(rules.band_below * float(frequencies[0]), min(rules.band_above * float(frequencies[-1]), limit))
-    colour = _colour_of(few, band, lambda item: _spectra(few, masses, band, _shear(storey), rules, item))
-    few_spectra = _spectra(few, masses, band, _shear(storey), rules, colour)
+    colour = _colour_of(few, band, lambda item: _spectra(few, masses, band, _shear(storey, turns), rules, item))
+    few_spectra = _spectra(few, masses, band, _shear(storey, turns), rules, colour)
     stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
     sheared = FrameProblem(
-        (), (), masses, band, storey, frequencies, rules, Weighting.without_ground(stiffness), colour
+        (),
+        (),
+        masses,
+        band,
+        storey,
+        frequencies,
+        rules,
+        Weighting.of_displacements(stiffness, training[0].turns),
+        colour,
     )
     sheared = replace(sheared, training=sheared.spectra(training))
     found = _bending(sheared, training) if _bends(sheared) else sheared
@@ -233,9 +241,9 @@ def _few(records: Sequence[FrameRecord], most: int = 3) -> list[FrameRecord]:
     return sorted(forced or records, key=lambda item: len(item.ground))[:most]
 
 
-def _shear(storey: FloatArray) -> Weighting:
+def _shear(storey: FloatArray, turns: int) -> Weighting:
     """Return the weighting of a shear frame."""
-    return Weighting.without_ground(_matrix(storey))
+    return Weighting.of_displacements(_matrix(storey), turns)
 
 
 def _matrix(storey: FloatArray) -> FloatArray:

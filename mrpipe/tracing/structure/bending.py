@@ -49,9 +49,9 @@ ROUNDS = 3
 
 def weighting_of(design: Design) -> Weighting:
     """Return the coefficients of a fitted general linear frame by which the noise of the sensors is propagated."""
-    n = len(design.residual)
-    linear = np.stack([numbers[: 2 * n + 2] for numbers in coefficients(design, None, np.zeros(0))])
-    return Weighting(-linear[:, :n], linear[:, 2 * n :])
+    n, turns = len(design.residual), design.spectra[0].record.turns
+    linear = np.stack([numbers[: 2 * n + 2 + turns] for numbers in coefficients(design, None, np.zeros(0))])
+    return Weighting(-linear[:, :n], linear[:, 2 * n : 2 * n + 2], -linear[:, 2 * n + 2 :])
 
 
 def natural_frequencies(weighting: Weighting, masses: FloatArray) -> FloatArray:
@@ -82,17 +82,21 @@ def bounded(record: Spectra, noise: Noise, masses: FloatArray) -> Noise:
     power = (design.residual[:, :lines] ** 2 + design.residual[:, lines:] ** 2) / record.weight**2
     floors = gains_of_floors(weighting, masses, frequencies, record.laser_share)
     ground = gains_of_ground(weighting, frequencies, record.laser_share)
-    gains = np.concatenate([ground[:, None], floors], axis=1) ** 2 * shape_of(noise.colour, frequencies / noise.rate_hz)
+    turns = np.repeat(weighting.turning[:, :, None], lines, axis=2) / (2.0 * np.pi * frequencies) ** 2
+    gains = np.concatenate([ground[:, None], floors, turns], axis=1) ** 2
+    gains *= shape_of(noise.colour, frequencies / noise.rate_hz)
     edges = np.geomspace(frequencies[0], frequencies[-1] * (1.0 + 1e-9), BAND_PARTS + 1)
     part = np.searchsorted(edges, frequencies, side="right") - 1
-    most = np.full(len(masses) + 1, np.inf)
+    densities = np.concatenate([noise.acceleration, noise.turning])
+    most = np.full(densities.size, np.inf)
     for number in range(BAND_PARTS):
         own = part == number
         if np.count_nonzero(own) >= FEWEST_LINES:
             least = np.maximum(np.mean(gains[:, :, own], axis=2), 1e-300)
             most = np.minimum(most, np.min(np.mean(power[:, own], axis=1)[:, None] / least, axis=0))
-    densities = noise.acceleration
-    return replace(noise, acceleration=np.where(most < LEAST_LEVEL * densities, most, densities))
+    lower = np.where(most < LEAST_LEVEL * densities, most, densities)
+    sensors = noise.acceleration.size
+    return replace(noise, acceleration=lower[:sensors], turning=lower[sensors:])
 
 
 def bounded_spectra(

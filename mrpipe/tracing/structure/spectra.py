@@ -53,15 +53,18 @@ class Weighting:
     ground
         Shear of each storey per ground acceleration, and per its second derivative over the square of the highest
         angular frequency in use, shape (n, 2) [kg]; zero for a frame whose modes are all in the band.
+    turning
+        Shear of each storey per rotation of each floor about the vertical, shape (n, turns) [N/rad].
     """
 
     stiffness: FloatArray
     ground: FloatArray
+    turning: FloatArray
 
     @classmethod
-    def without_ground(cls, stiffness: FloatArray) -> Weighting:
-        """Return the weighting of a frame whose forces depend on the displacements alone."""
-        return cls(stiffness, np.zeros((len(stiffness), 2)))
+    def of_displacements(cls, stiffness: FloatArray, turns: int = 0) -> Weighting:
+        """Return the weighting of a frame whose forces depend on the displacements alone, not on rotations."""
+        return cls(stiffness, np.zeros((len(stiffness), 2)), np.zeros((len(stiffness), turns)))
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class Motion:
 
     `acceleration` is absolute and high-pass filtered at the band. `state_displacement` and `state_velocity` include the
     slow part that lasers measure, because memories and gaps of effects depend on it. `drift` and `drift_rate` are their
-    differences between floors, storey after storey, shape (n, m).
+    differences between floors, storey after storey, shape (n, m). `turn` and `turn_rate` are the rotation of the floors
+    about the vertical and its rate, shape (m, turns).
     """
 
     displacement: FloatArray
@@ -81,6 +85,8 @@ class Motion:
     state_velocity: FloatArray
     drift: FloatArray
     drift_rate: FloatArray
+    turn: FloatArray
+    turn_rate: FloatArray
 
 
 @dataclass(frozen=True)
@@ -98,8 +104,8 @@ class Spectra:
     target
         Shear force of each storey from inertia, shape (n, b) [N/sqrt(Hz)].
     regressors
-        Displacements, velocities (relative, n each), ground acceleration and its second derivative, then known loads;
-        shape (p, b).
+        Displacements, velocities (relative, n each), ground acceleration and its second derivative, then known loads,
+        and rotations of the floors and their rates; shape (p, b).
     weight
         Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
     variance
@@ -172,7 +178,9 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules |
     dt, corner = record.dt, INTEGRATION_SHARE * band.low_hz
     size, n = record.acceleration.shape
     pad = _padding(size, int(6.0 / (corner * dt)))
-    lines, frequencies = _padded_lines(np.column_stack([record.relative, record.acceleration, record.ground]), pad, dt)
+    turning = record.turning if record.turns else np.zeros((size, 0))
+    stack = np.column_stack([record.relative, record.acceleration, record.ground, turning])
+    lines, frequencies = _padded_lines(stack, pad, dt)
     keep = _high_pass(frequencies, corner)[:, None]
     omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)[:, None]
     total = size + 2 * pad
@@ -192,11 +200,15 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules |
             moved[:, floor - 1 : floor] = keep * (share * own + (1.0 - share) * integrated[:, floor - 1 : floor])
         slow = (seen * (1.0 - keep)) @ _over_floors(n, floors)
     displacement, velocity = back(moved), back(moved * 1j * omega)
-    filtered = back(lines[:, n:] * keep)
+    filtered = back(lines[:, n : 2 * n + 1] * keep)
+    turned = -lines[:, 2 * n + 1 :] / omega**2 * keep
     state, rate = displacement + back(slow), velocity + back(slow * 1j * omega)
     drift = np.ascontiguousarray(np.diff(state, axis=1, prepend=0.0).T)
     drift_rate = np.ascontiguousarray(np.diff(rate, axis=1, prepend=0.0).T)
-    return Motion(displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate)
+    return Motion(
+        displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate, back(turned),
+        back(turned * 1j * omega),
+    )  # fmt: skip
 
 
 def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> ComplexArray:
@@ -341,11 +353,14 @@ def spectra_of(
     for floor in range(1, n + 1):
         if floor in loads:
             parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
+    if record.turns:
+        parts += [spectrum_of(item, taper, dt, frequencies) for item in (motion.turn, motion.turn_rate)]
     target = spectrum_of(shear, taper, dt, frequencies)
     lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
     sensors = noise.of_accelerometers(frequencies)
     variance = np.einsum("slb,lb->sb", gains_of_floors(weighting, masses, frequencies, lasers) ** 2, sensors[1:])
     variance += sensors[0] * gains_of_ground(weighting, frequencies, lasers) ** 2
+    variance += np.einsum("sc,cb->sb", weighting.turning**2, noise.of_turning(frequencies) / omega**4)
     of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
     variance += np.einsum("sl,lb->sb", weighting.stiffness**2, of_lasers)
     # the noise of a load cell enters the equation of every storey below the load
