@@ -66,6 +66,8 @@ class FaultAndEffect:
         effects = [{**item, "confidence": min(item["confidence"], most)} for item in summary["effects"]]
         names = listed([f"{item['name']} ({item['place']})" for item in effects])
         sentence = f"{names}: explains what a fault of a sensor leaves ({self.fault.sentence()}); correct the channel"
+        if differing := [item["name"] for item in summary["frame"]["differing_tests"]]:
+            sentence += f"; the error of {listed(differing)} exceeds the noise nevertheless"
         tests = [{**item, "nrmse_before": self.recorded.by_test[item["name"]]} for item in summary["tests"]]
         verdict = Verdict("partly explained", sentence).sentence_as_json()
         return {**summary, **verdict, "effects": effects, "before": self.recorded.as_json(), "tests": tests}
@@ -114,15 +116,37 @@ def fault_and_effect(
         return None
     for start in _possible(problem, selection, rules.least_share):
         again, found = _traced(problem, start, choose)
-        if not found.chosen or found.share(found.residual) < rules.least_share:
+        if len(found.chosen) <= found.declared or found.share(found.residual) < rules.least_share:
             continue
         fault = with_smaller_residual(start, without_effects(again.training, found), problem.masses_kg)
-        again, found = _traced(problem, fault, choose)
-        if found.chosen and found.share(found.residual) >= rules.named_share:
-            known = selection.chosen[: selection.declared]
-            recorded = frame_score(model_of(selection.design, known, selection.about), problem.validation)
-            return FaultAndEffect(fault, again, found, recorded)
+        both = effect_after(fault, problem, selection, rules, choose)
+        if both is not None:
+            return both
     return None
+
+
+def effect_after(
+    fault: SensorFault, problem: FrameProblem, selection: FrameSelection, rules: NamingRules, choose: Select
+) -> FaultAndEffect | None:
+    """Return the effects that explain what is missing in records that are corrected for a fault; None if none do.
+
+    Parameters
+    ----------
+    fault
+        Fault of a sensor.
+    problem, selection
+        Spectra of the records as they were recorded, and the linear frame that was fitted to them.
+    rules
+        Rules for naming an effect.
+    choose
+        Selection of effects on a problem.
+    """
+    again, found = _traced(problem, fault, choose)
+    if len(found.chosen) <= found.declared or found.share(found.residual) < rules.named_share:
+        return None
+    known = selection.chosen[: selection.declared]
+    recorded = frame_score(model_of(selection.design, known, selection.about), problem.validation)
+    return FaultAndEffect(fault, again, found, recorded)
 
 
 def _possible(problem: FrameProblem, selection: FrameSelection, least_share: float) -> Iterator[SensorFault]:

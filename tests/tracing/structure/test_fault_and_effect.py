@@ -28,7 +28,12 @@ def _traced(fault: str, effect: str) -> FrameTracing:
 
 @pytest.mark.parametrize(
     ("fault", "gain", "test"),
-    [("gain", 0.85, None), ("sign in one test", -1.0, "sweep-1"), ("exchanged", 1.0, "sweep-1")],
+    [
+        ("gain", 0.85, None),
+        ("sign in one test", -1.0, "sweep-1"),
+        ("exchanged", 1.0, "sweep-1"),
+        ("exchanged in all tests", 1.0, None),
+    ],
 )
 def test_the_fault_and_the_effect_are_both_reported(fault: str, gain: float, test: str | None) -> None:
     summary = _traced(fault, "cubic-stiffness").summary
