@@ -29,6 +29,7 @@ from mrpipe.tracing.structure.spectra import (
     gains_of_floors,
     gains_of_ground,
     motion_of,
+    reweighted,
     spectra_of,
     storey_sums,
 )
@@ -120,10 +121,27 @@ def bounded_spectra(
         Colour of the noise of the accelerometers [1].
     """
     noise = noise_of(record, band.high_hz, rules, colour)
+    spectra = spectra_of(record, masses, band, noise, weighting, motion_of(record, band, noise, rules), rules)
+    return _with_bounds(spectra, noise, masses, band, weighting, rules)
+
+
+def _with_bounds(
+    spectra: Spectra, noise: Noise, masses: FloatArray, band: Band, weighting: Weighting, rules: FrameRules
+) -> Spectra:
+    # the fit by which the noise is bounded depends on the noise
     for _ in range(2):
-        # the weights of the fit by which the noise is bounded depend on the noise
-        spectra = spectra_of(record, masses, band, noise, weighting, motion_of(record, band, noise, rules), rules)
+        spectra = _with_noise(spectra, noise, masses, band, weighting, rules)
         noise = bounded(spectra, noise, masses)
+    return _with_noise(spectra, noise, masses, band, weighting, rules)
+
+
+def _with_noise(
+    spectra: Spectra, noise: Noise, masses: FloatArray, band: Band, weighting: Weighting, rules: FrameRules
+) -> Spectra:
+    record = spectra.record
+    if not record.measured_displacement:
+        return reweighted(spectra, masses, noise, weighting, rules)
+    # the motion combines both kinds of sensors according to their noise
     return spectra_of(record, masses, band, noise, weighting, motion_of(record, band, noise, rules), rules)
 
 
@@ -152,8 +170,14 @@ def fitted_weighting(
     colour
         Colour of the noise of the accelerometers [1].
     """
+    noises = [noise_of(item, band.high_hz, rules, colour) for item in records]
+    spectra = [
+        spectra_of(item, masses, band, noise, start, motion_of(item, band, noise, rules), rules)
+        for item, noise in zip(records, noises, strict=True)
+    ]
     weighting = start
     for _ in range(ROUNDS):
-        spectra = [bounded_spectra(item, masses, band, weighting, rules, colour) for item in records]
+        pairs = zip(spectra, noises, strict=True)
+        spectra = [_with_bounds(item, noise, masses, band, weighting, rules) for item, noise in pairs]
         weighting = weighting_of(design_of("linear-frame", spectra))
     return weighting

@@ -73,8 +73,8 @@ class FaultAndEffect:
         return {**summary, **verdict, "effects": effects, "before": self.recorded.as_json(), "tests": tests}
 
 
-def fault_alone(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
-    """Return the fault of a sensor that leaves nothing unexplained, where effects leave something.
+def promising_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
+    """Return the fault of a sensor that removes most of the residual of the linear frame, where effects leave some.
 
     Parameters
     ----------
@@ -88,21 +88,33 @@ def fault_alone(problem: FrameProblem, selection: FrameSelection, rules: NamingR
     if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
         return None
     design = design_of("linear-frame", problem.training)
-    fault = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
-    if fault is None:
-        return None
-    # the noise was estimated with the faulty sensor: fit the repaired records again
+    return likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
+
+
+def leaves_nothing(fault: SensorFault, problem: FrameProblem) -> bool:
+    """Return whether the residual of a linear frame is noise once the records are corrected for a fault.
+
+    Parameters
+    ----------
+    fault
+        The fault.
+    problem
+        Spectra of the records as they were recorded. The noise was estimated with the faulty sensor, and is estimated
+        again.
+    """
     design = design_of("linear-frame", _repaired(problem, fault).training)
-    return None if groups_of(design, problem.rules).material(design.residual) else fault
+    return not groups_of(design, problem.rules).material(design.residual)
 
 
 def fault_and_effect(
-    problem: FrameProblem, selection: FrameSelection, rules: NamingRules, choose: Select
+    fault: SensorFault | None, problem: FrameProblem, selection: FrameSelection, rules: NamingRules, choose: Select
 ) -> FaultAndEffect | None:
     """Return the fault of a sensor and the effects that together explain the residual; None if none do.
 
     Parameters
     ----------
+    fault
+        Fault that removes most of the residual of the linear frame; None if none does.
     problem
         Spectra of the records.
     selection
@@ -114,12 +126,12 @@ def fault_and_effect(
     """
     if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
         return None
-    for start in _possible(problem, selection, rules.least_share):
+    for start in _possible(fault, problem, selection, rules.least_share):
         again, found = _traced(problem, start, choose)
         if len(found.chosen) <= found.declared or found.share(found.residual) < rules.least_share:
             continue
-        fault = with_smaller_residual(start, without_effects(again.training, found), problem.masses_kg)
-        both = effect_after(fault, problem, selection, rules, choose)
+        refined = with_smaller_residual(start, without_effects(again.training, found), problem.masses_kg)
+        both = effect_after(refined, problem, selection, rules, choose)
         if both is not None:
             return both
     return None
@@ -149,17 +161,17 @@ def effect_after(
     return FaultAndEffect(fault, again, found, recorded)
 
 
-def _possible(problem: FrameProblem, selection: FrameSelection, least_share: float) -> Iterator[SensorFault]:
-    """Yield the fault that removes most of the residual of the linear frame, and of that with the chosen effects."""
-    masses, rules = problem.masses_kg, problem.rules
-    spectra = [problem.training]
-    if selection.chosen:
-        spectra.append(without_effects(problem.training, selection))
-    for items in spectra:
-        design = design_of("linear-frame", items)
-        fault = likely_fault(design, groups_of(design, rules), masses, least_share)
-        if fault is not None:
-            yield fault
+def _possible(
+    fault: SensorFault | None, problem: FrameProblem, selection: FrameSelection, least_share: float
+) -> Iterator[SensorFault]:
+    """Yield the given fault, and the one that removes most of the residual with the chosen effects."""
+    if fault is not None:
+        yield fault
+    if len(selection.chosen) > selection.declared:
+        design = design_of("linear-frame", without_effects(problem.training, selection))
+        found = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, least_share)
+        if found is not None:
+            yield found
 
 
 def _traced(problem: FrameProblem, fault: SensorFault, choose: Select) -> tuple[FrameProblem, FrameSelection]:

@@ -9,7 +9,7 @@ spectrum is weighted by the noise that the accelerometers cause in it; at low fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import fft, signal
@@ -357,17 +357,42 @@ def spectra_of(
         parts += [spectrum_of(item, taper, dt, frequencies) for item in (motion.turn, motion.turn_rate)]
     target = spectrum_of(shear, taper, dt, frequencies)
     lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
+    unweighted = Spectra(
+        record, motion, frequencies, taper, target, np.concatenate(parts), np.ones(target.shape),
+        np.ones(target.shape), lasers,
+    )  # fmt: skip
+    return reweighted(unweighted, masses, noise, weighting, rules)
+
+
+def reweighted(
+    spectra: Spectra, masses: FloatArray, noise: Noise, weighting: Weighting, rules: FrameRules | None = None
+) -> Spectra:
+    """Return spectra with the weights that follow from the noise of the sensors.
+
+    Parameters
+    ----------
+    spectra
+        Spectra of a record. If it has displacement sensors, their share in the motion is not changed.
+    masses
+        Shape (n,) [kg].
+    noise
+        Noise of the sensors.
+    weighting
+        Linear frame by which the noise is propagated.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    frequencies, lasers, n = spectra.frequencies_hz, spectra.laser_share, len(masses)
     sensors = noise.of_accelerometers(frequencies)
     variance = np.einsum("slb,lb->sb", gains_of_floors(weighting, masses, frequencies, lasers) ** 2, sensors[1:])
     variance += sensors[0] * gains_of_ground(weighting, frequencies, lasers) ** 2
-    variance += np.einsum("sc,cb->sb", weighting.turning**2, noise.of_turning(frequencies) / omega**4)
+    turning = noise.of_turning(frequencies) / (2.0 * np.pi * frequencies) ** 4
+    variance += np.einsum("sc,cb->sb", weighting.turning**2, turning)
     of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
     variance += np.einsum("sl,lb->sb", weighting.stiffness**2, of_lasers)
     # the noise of a load cell enters the equation of every storey below the load
     for floor, density in noise.loads.items():
         variance[:floor] += density
-    own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
+    own = np.mean(np.abs(spectra.target) ** 2, axis=1, keepdims=True)
     variance = variance + (rules or FrameRules()).model_floor ** 2 * own
-    return Spectra(
-        record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance, lasers
-    )
+    return replace(spectra, weight=np.sqrt(2.0 / variance), variance=variance)

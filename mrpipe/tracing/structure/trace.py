@@ -17,7 +17,13 @@ from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.exchange import exchanged_floors
-from mrpipe.tracing.structure.fault_and_effect import FaultAndEffect, effect_after, fault_alone, fault_and_effect
+from mrpipe.tracing.structure.fault_and_effect import (
+    FaultAndEffect,
+    effect_after,
+    fault_and_effect,
+    leaves_nothing,
+    promising_fault,
+)
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
 from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests, in_words
@@ -170,14 +176,18 @@ def _diagnosis(
     exchange = exchanged_floors(problem)
     # the drifts of exchanged floors are wrong, and so would be the effects that act on them
     selection = choose(problem, 0 if exchange else most)
-    fault = exchange or fault_alone(problem, selection, rules)
+    fault = exchange or promising_fault(problem, selection, rules)
     if exchange:
         both = effect_after(exchange, problem, selection, rules, select_all)
+    elif fault and leaves_nothing(fault, problem):
+        return _Diagnosis(problem, selection, fault.reason(), fault)
     else:
-        both = None if fault else fault_and_effect(problem, selection, rules, select_all)
+        both = fault_and_effect(fault, problem, selection, rules, select_all)
     if both:
         return _Diagnosis(both.problem, both.selection, "", both.fault, both)
-    return _Diagnosis(problem, selection, fault.reason() if fault else _unnamed(selection, rules), fault)
+    if exchange:
+        return _Diagnosis(problem, selection, exchange.reason(), exchange)
+    return _Diagnosis(problem, selection, _unnamed(selection, rules))
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:
