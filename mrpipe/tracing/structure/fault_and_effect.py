@@ -131,6 +131,9 @@ def fault_and_effect(
         if len(found.chosen) <= found.declared or found.share(found.residual) < rules.least_share:
             continue
         refined = with_smaller_residual(start, without_effects(again.training, found), problem.masses_kg)
+        # what an effect leaves because of its form also looks like a small error of a gain
+        if not refined.exceeds(problem.rules.same_gain, problem.band.high_hz):
+            continue
         both = effect_after(refined, problem, selection, rules, choose)
         if both is not None:
             return both

@@ -127,6 +127,13 @@ def test_no_fault_explains_a_nonlinear_stiffness() -> None:
     assert _found(_problem("none", "cubic-stiffness")) is None
 
 
+def test_a_fault_within_the_error_of_a_calibration_does_not_count() -> None:
+    assert not SensorFault(2, gain=1.01, delay_s=1e-4).exceeds(0.02, 20.0)
+    assert SensorFault(2, gain=0.97).exceeds(0.02, 20.0)
+    assert SensorFault(2, delay_s=3e-4).exceeds(0.02, 20.0)
+    assert SensorFault(2, exchanged_with=3).exceeds(0.02, 20.0)
+
+
 def test_a_gain_in_all_tests_may_be_a_wrong_mass() -> None:
     assert "or the mass of floor 2 is 0.8 times the declared one" in SensorFault(2, gain=0.8).sentence()
     assert "mass" not in SensorFault(2, "sweep-1", 0.8).sentence()
