@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,11 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.structure.bending import bounded_spectra, fitted_weighting, natural_frequencies
 from mrpipe.tracing.structure.fit import Base, Design, base_rows, coefficients, design_of, stacked
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, possible_colours
-from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, spectra_of, storey_sums
+from mrpipe.tracing.structure.spectra import Band, Spectra, Weighting, motion_of, spectra_of, storey_sums
 
 OF_RATE = 0.4
 """Numerical technique: highest frequency in use, as a share of the sampling rate, because of anti-alias filters."""
@@ -56,9 +57,10 @@ class FrameProblem:
         Natural frequencies of this shear frame, shape (n,) [Hz].
     rules
         Decision thresholds.
-    stiffness, colour
-        Shear of each storey per floor displacement, shape (n, n) [N/m], and colour of the sensors' noise [1]; the
-        weights of the lines follow from them.
+    weighting, colour
+        Linear frame, and colour of the sensors' noise [1]; the weights of the lines follow from them.
+    bends
+        Whether the records need the stiffness of a general linear frame; band, weights and noise then follow from it.
     """
 
     training: tuple[Spectra, ...]
@@ -68,12 +70,20 @@ class FrameProblem:
     storey_stiffness: FloatArray
     frequencies_hz: FloatArray
     rules: FrameRules
-    stiffness: FloatArray
+    weighting: Weighting
     colour: float
+    bends: bool = False
 
     def spectra_of(self, record: FrameRecord) -> Spectra:
         """Return the spectra of a further record, with the same band and weights."""
-        return _with_levels([record], self.masses_kg, self.band, self.stiffness, self.rules, self.colour)[0]
+        return self.spectra([record])[0]
+
+    def spectra(self, records: Sequence[FrameRecord]) -> tuple[Spectra, ...]:
+        """Return the spectra of further records, with the same band and weights."""
+        masses, band, weighting = self.masses_kg, self.band, self.weighting
+        if self.bends:
+            return tuple(bounded_spectra(item, masses, band, weighting, self.rules, self.colour) for item in records)
+        return _with_levels(records, masses, band, weighting, self.rules, self.colour)
 
 
 def frame_problem(
@@ -94,49 +104,88 @@ def frame_problem(
         Decision thresholds; their defaults if None.
     """
     rules = rules or FrameRules()
-    n = len(masses)
+    n, turns = len(masses), training[0].turns
     band = _band_of_power(training)
     storey = np.full(n, float(np.mean(masses)) * (2.0 * np.pi * np.sqrt(band.low_hz * band.high_hz)) ** 2)
     frequencies = np.zeros(n)
     # few records are sufficient for band and weights: the shortest forced ones
     few = _few(training)
+    limit = min(OF_RATE * item.rate_hz for item in training)
     for _ in range(3):
-        spectra = _spectra(few, masses, band, _matrix(storey), rules)
+        spectra = _spectra(few, masses, band, _shear(storey, turns), rules)
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
-        limits = [OF_RATE * item.rate_hz for item in training]
-        band = Band(rules.band_below * float(frequencies[0]), min(rules.band_above * float(frequencies[-1]), *limits))
-    colour = _colour_of(few, masses, band, _matrix(storey), rules)
-    few_spectra = _spectra(few, masses, band, _matrix(storey), rules, colour)
+        band = Band(rules.band_below * float(frequencies[0]), min(rules.band_above * float(frequencies[-1]), limit))
+    colour = _colour_of(few, band, lambda item: _spectra(few, masses, band, _shear(storey, turns), rules, item))
+    few_spectra = _spectra(few, masses, band, _shear(storey, turns), rules, colour)
     stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
-    found, held = (_with_levels(items, masses, band, stiffness, rules, colour) for items in (training, validation))
-    return FrameProblem(found, held, masses, band, storey, frequencies, rules, stiffness, colour)
+    sheared = FrameProblem(
+        (),
+        (),
+        masses,
+        band,
+        storey,
+        frequencies,
+        rules,
+        Weighting.of_displacements(stiffness, training[0].turns),
+        colour,
+    )
+    sheared = replace(sheared, training=sheared.spectra(training))
+    found = _bending(sheared, training) if _bends(sheared) else sheared
+    return replace(found, validation=found.spectra(validation))
+
+
+def _bends(problem: FrameProblem) -> bool:
+    """Return whether a general linear frame has a much smaller residual than a shear frame."""
+    simple, free = (item.chi_square for item in ladder(problem.training).values())
+    return bool(np.sqrt(simple) > (1.0 + problem.rules.of_floor) * np.sqrt(max(free, 1.0)))
+
+
+def _bending(problem: FrameProblem, records: Sequence[FrameRecord]) -> FrameProblem:
+    """Return the problem of a structure that is not a shear frame, with band and weights of a general linear frame.
+
+    The modes are identified in the band that contains the power of the motion.
+    """
+    masses, rules = problem.masses_kg, problem.rules
+    limit = min(OF_RATE * item.rate_hz for item in records)
+    of_power = _band_of_power(records)
+    whole = Band(problem.band.low_hz, min(max(of_power.high_hz, problem.band.high_hz), limit))
+    weighting = fitted_weighting(records, masses, whole, problem.weighting, rules, 0.0)
+    fastest = float(natural_frequencies(weighting, masses)[-1])
+    band = Band(problem.band.low_hz, float(np.clip(rules.band_above * fastest, 2.0 * problem.band.low_hz, limit)))
+    few = _few(records)
+    colour = _colour_of(
+        few, band, lambda item: [bounded_spectra(one, masses, band, weighting, rules, item) for one in few]
+    )
+    weighting = fitted_weighting(records, masses, band, weighting, rules, colour)
+    found = replace(problem, band=band, weighting=weighting, colour=colour, bends=True)
+    return replace(found, training=found.spectra(records))
 
 
 def _spectra(
     records: Sequence[FrameRecord],
     masses: FloatArray,
     band: Band,
-    stiffness: FloatArray,
+    weighting: Weighting,
     rules: FrameRules,
     colour: float = 0.0,
 ) -> list[Spectra]:
     noises = [noise_of(item, band.high_hz, rules, colour) for item in records]
     return [
-        _spectra_of(item, masses, band, stiffness, rules, noise) for item, noise in zip(records, noises, strict=True)
+        _spectra_of(item, masses, band, weighting, rules, noise) for item, noise in zip(records, noises, strict=True)
     ]
 
 
 def _spectra_of(
-    record: FrameRecord, masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules, noise: Noise
+    record: FrameRecord, masses: FloatArray, band: Band, weighting: Weighting, rules: FrameRules, noise: Noise
 ) -> Spectra:
-    return spectra_of(record, masses, band, noise, stiffness, motion_of(record, band, noise, rules), rules)
+    return spectra_of(record, masses, band, noise, weighting, motion_of(record, band, noise, rules), rules)
 
 
 def _with_levels(
     records: Sequence[FrameRecord],
     masses: FloatArray,
     band: Band,
-    stiffness: FloatArray,
+    weighting: Weighting,
     rules: FrameRules,
     colour: float,
 ) -> tuple[Spectra, ...]:
@@ -149,18 +198,16 @@ def _with_levels(
     found = []
     for record in records:
         noise = noise_of(record, band.high_hz, rules, colour)
-        spectra = _spectra_of(record, masses, band, stiffness, rules, noise)
+        spectra = _spectra_of(record, masses, band, weighting, rules, noise)
         level = float(np.quantile(_powers(design_of("linear-frame", [spectra])), 0.75))
         if level < LEAST_LEVEL:
             lower = replace(noise, acceleration=level * noise.acceleration)
-            spectra = _spectra_of(record, masses, band, stiffness, rules, lower)
+            spectra = _spectra_of(record, masses, band, weighting, rules, lower)
         found.append(spectra)
     return tuple(found)
 
 
-def _colour_of(
-    records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules
-) -> float:
+def _colour_of(records: Sequence[FrameRecord], band: Band, spectra_with: Callable[[float], Sequence[Spectra]]) -> float:
     """Return the colour of the sensors' noise with which the residual is noise at all frequencies alike.
 
     The residual of a linear frame is noise at most storeys and frequencies, because an effect acts on few of them. In
@@ -170,8 +217,7 @@ def _colour_of(
     spread = []
     possible = possible_colours(records, band.high_hz)
     for colour in possible if len(possible) > 1 else ():
-        spectra = _spectra(records, masses, band, stiffness, rules, colour)
-        powers = [_powers(design_of("linear-frame", [item])) for item in spectra]
+        powers = [_powers(design_of("linear-frame", [item])) for item in spectra_with(colour)]
         relative = np.concatenate([np.maximum(item, 1e-300) / np.median(item) for item in powers])
         spread.append(float(np.std(np.log(np.quantile(relative, 0.25, axis=0)))))
     return possible[int(np.argmin(spread))] if spread else possible[0]
@@ -193,6 +239,11 @@ def _powers(design: Design) -> FloatArray:
 def _few(records: Sequence[FrameRecord], most: int = 3) -> list[FrameRecord]:
     forced = [item for item in records if item.kind in ("sweep", "random")]
     return sorted(forced or records, key=lambda item: len(item.ground))[:most]
+
+
+def _shear(storey: FloatArray, turns: int) -> Weighting:
+    """Return the weighting of a shear frame."""
+    return Weighting.of_displacements(_matrix(storey), turns)
 
 
 def _matrix(storey: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.tracing.structure.records import TURN
 
 _SENSOR = re.compile(r"^(floor_(?:acceleration|displacement)_\d+)_([a-z]\w*)$")
 _GROUND, _FORCE = "ground_acceleration", "input_force"
@@ -40,13 +41,50 @@ def in_direction(campaign: Campaign, axis: str) -> Campaign | None:
 
     Returns
     -------
-    The campaign, or None if no test can be used.
+    The campaign, or None if no test can be used. If the sensors of all floors determine the rotation about the vertical
+    in all tests, it has the channels `floor_turn_1` and so on [rad/s2].
     """
     positions = (campaign.declared.get("frame") or {}).get("sensor_positions_m") or {}
     axes = directions_of(campaign)
     tests = [_test_in(item, axis, positions, first=axis == axes[0]) for item in campaign.recordings]
     kept = tuple(item for item in tests if item is not None)
+    plates = [_plates_of(item, positions) for item in campaign.recordings if any(item.name == one.name for one in kept)]
+    if kept and all(plates):
+        kept = tuple(_with_plates(item, own, axis) for item, own in zip(kept, plates, strict=True))
     return replace(campaign, recordings=kept) if kept else None
+
+
+def _plates_of(test: Recording, positions: Mapping[str, Sequence[float]]) -> dict[str, dict[str, FloatArray]]:
+    """Return number of a floor -> acceleration of its centre of mass along each axis, and `turn` [rad/s2].
+
+    The result is empty if the sensors of some floor do not determine its rotation.
+    """
+    sensors: dict[str, dict[str, FloatArray]] = {}
+    for name, values in test.channels.items():
+        found = _SENSOR.match(name)
+        if found is not None and found[1].startswith("floor_acceleration_"):
+            sensors.setdefault(found[1].rpartition("_")[2], {})[found[2]] = values
+    plates = {floor: _plate(own, positions) for floor, own in sensors.items()}
+    return plates if all(plates.values()) else {}
+
+
+def _plate(sensors: Mapping[str, FloatArray], positions: Mapping[str, Sequence[float]]) -> dict[str, FloatArray]:
+    axes = sorted({name[0] for name in sensors})
+    if not set(axes) <= {"x", "y"} or not all(name in positions for name in sensors):
+        return {}
+    # u_x = u - y turn, u_y = u + x turn
+    levers = [-positions[name][1] if name[0] == "x" else positions[name][0] for name in sensors]
+    rows = np.column_stack([*([float(name[0] == axis) for name in sensors] for axis in axes), levers])
+    if np.linalg.matrix_rank(rows) < rows.shape[1]:
+        return {}
+    return dict(zip([*axes, "turn"], np.linalg.pinv(rows) @ np.stack(list(sensors.values())), strict=True))
+
+
+def _with_plates(test: Recording, plates: Mapping[str, Mapping[str, FloatArray]], axis: str) -> Recording:
+    channels = dict(test.channels)
+    for floor, plate in plates.items():
+        channels |= {f"floor_acceleration_{floor}": plate[axis], f"{TURN}{floor}": plate["turn"]}
+    return replace(test, channels=channels)
 
 
 def _test_in(test: Recording, axis: str, positions: Mapping[str, Sequence[float]], *, first: bool) -> Recording | None:

@@ -64,6 +64,27 @@ def likely_fault(design: Design, groups: Groups, masses: FloatArray, least_share
     return replace(best, explained=removed) if removed >= least_share else None
 
 
+def with_smaller_residual(fault: SensorFault, spectra: Sequence[Spectra], masses: FloatArray) -> SensorFault:
+    """Return a fault whose gain and delay are changed so that records corrected with it have the smallest residual.
+
+    Parameters
+    ----------
+    fault
+        The fault. An exchange of two floors has neither gain nor delay, and is returned as it is.
+    spectra
+        Spectra of the records that were corrected with it.
+    masses
+        Floor masses, shape (n,) [kg].
+    """
+    if fault.exchanged_with:
+        return fault
+    rest, _ = _fitted(SensorFault(fault.floor, fault.test), spectra, masses)
+    return replace(
+        fault, gain=fault.gain * rest.gain, delay_s=fault.delay_s + rest.delay_s,
+        gain_error=abs(fault.gain) * rest.gain_error, delay_error_s=rest.delay_error_s,
+    )  # fmt: skip
+
+
 def fault_in_record(
     base: Base, linear: Sequence[FloatArray], record: Spectra, expected: ComplexArray, masses: FloatArray
 ) -> SensorFault:

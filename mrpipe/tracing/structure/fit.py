@@ -37,7 +37,10 @@ class Columns:
 
 
 def base_rows(base: Base, spectra: Spectra, storey: int) -> ComplexArray:
-    """Return the regressors of a storey, shape (p, b): drift (or all floors), velocities, ground, loads."""
+    """Return the regressors of a storey, shape (p, b): drift (or all floors), velocities, ground, rotations, loads.
+
+    Only the general linear frame is coupled to the rotations of the floors about the vertical.
+    """
     n = spectra.record.floors
     values = spectra.regressors
     displacement, velocity, ground = values[:n], values[n : 2 * n], values[2 * n : 2 * n + 2]
@@ -45,7 +48,9 @@ def base_rows(base: Base, spectra: Spectra, storey: int) -> ComplexArray:
     moved = displacement if base == "linear-frame" else drift[None]
     floors = sorted({*spectra.record.loads, *([1] if "force" in spectra.record.damper else [])})
     acting = [values[2 * n + 2 + k] for k, floor in enumerate(floors) if floor > storey]
-    parts = [moved, velocity, ground]
+    turns = spectra.record.turns
+    turned = values[len(values) - 2 * turns :] if turns and base == "linear-frame" else values[:0]
+    parts = [moved, velocity, ground, turned]
     if acting:
         parts.append(np.stack(acting))
     return np.concatenate(parts)

@@ -50,6 +50,8 @@ class FrameRecord:
         Entries of the test in campaign.yaml.
     computed
         Floors (from 1) without a sensor, whose acceleration was computed.
+    turning
+        Angular acceleration of every floor about the vertical, shape (m, n) [rad/s2], or (m, 0) if it is not known.
     """
 
     name: str
@@ -64,6 +66,12 @@ class FrameRecord:
     from_displacement: tuple[int, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
     computed: tuple[int, ...] = ()
+    turning: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def turns(self) -> int:
+        """Number of floors whose rotation about the vertical is known: all or none."""
+        return int(self.turning.shape[1])
 
     @property
     def dt(self) -> float:
@@ -105,6 +113,8 @@ class FrameData:
         return [item for item in self.records if item.role in roles]
 
 
+TURN = "floor_turn_"
+"""Beginning of the names of channels with the angular acceleration of a floor about the vertical [rad/s2]."""
 COMPUTED = "computed_floors"
 """Key of the details of a test: floors (from 1) whose motion was computed from that of the others."""
 _FLOORS = ("floor_acceleration_", "floor_displacement_")
@@ -256,7 +266,9 @@ def _record(recording: Recording, rate_hz: float) -> FrameRecord:
         )
         if name in channels
     }  # fmt: skip
+    turning = [channels[f"{TURN}{floor}"] for floor in floors if f"{TURN}{floor}" in channels]
     return FrameRecord(
         recording.name, recording.role, recording.kind, rate, ground, np.column_stack(columns), displacement, loads,
         damper, tuple(derived), dict(recording.details), tuple(recording.details.get(COMPUTED, ())),
+        np.stack(turning, axis=1) if turning else np.zeros((size, 0)),
     )  # fmt: skip

@@ -91,6 +91,18 @@ class SensorFault:
         mass = f", or the mass of floor {self.floor} is {self.gain:.3g} times the declared one"
         return text + (mass if len(said) == 1 and "gain" in said[0] and self._may_be_mass else "")
 
+    def exceeds(self, share: float, frequency_hz: float) -> bool:
+        """Return whether the fault changes a signal by more than a share of it, at frequencies up to the given one."""
+        phase = 2.0 * math.pi * frequency_hz * abs(self.delay_s)
+        return bool(self.exchanged_with) or abs(self.gain - 1.0) > share or phase > share
+
+    def reason(self) -> str:
+        """Return why no effect is named, in words."""
+        if self.exchanged_with and not self.test:
+            why = "the displacement of the lowest mode grows from floor to floor only in this order"
+            return f"{self.sentence()}: {why}; correct the channels, and trace again"
+        return f"{self.sentence()}, which explains what is missing; correct the channel, and trace again"
+
     @property
     def _may_be_mass(self) -> bool:
         return bool(self.floor) and not self.test and self.gain > 0.0

@@ -61,6 +61,8 @@ class Noise:
         Coefficient of the autoregressive process of the accelerometers; 0 if their noise is white.
     rate_hz
         Sampling rate [Hz].
+    turning
+        Power density of the angular accelerations of the floors, shape (turns,) [(rad/s2)^2/Hz].
     """
 
     acceleration: FloatArray
@@ -68,10 +70,15 @@ class Noise:
     loads: dict[int, float] = field(default_factory=dict)
     colour: float = 0.0
     rate_hz: float = 1.0
+    turning: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def of_accelerometers(self, frequencies_hz: FloatArray) -> FloatArray:
         """Return the power density of ground and floor accelerometers at frequencies, shape (1 + n, f)."""
         return np.asarray(self.acceleration[:, None] * shape_of(self.colour, frequencies_hz / self.rate_hz))
+
+    def of_turning(self, frequencies_hz: FloatArray) -> FloatArray:
+        """Return the power density of the angular accelerations at frequencies, shape (turns, f)."""
+        return np.asarray(self.turning[:, None] * shape_of(self.colour, frequencies_hz / self.rate_hz))
 
 
 def shape_of(colour: float, cycles_per_sample: FloatArray) -> FloatArray:
@@ -200,6 +207,7 @@ def noise_of(record: FrameRecord, band_high_hz: float, rules: FrameRules | None 
         {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
         colour,
         rate,
+        np.array([noise_density(item, rate, above, quietest, colour) for item in record.turning.T]),
     )
 
 

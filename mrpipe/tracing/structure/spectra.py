@@ -9,7 +9,7 @@ spectrum is weighted by the noise that the accelerometers cause in it; at low fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import fft, signal
@@ -43,12 +43,38 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Weighting:
+    """Linear frame by which the noise of the sensors is propagated to the equations of the storeys.
+
+    Attributes
+    ----------
+    stiffness
+        Shear of each storey per floor displacement, shape (n, n) [N/m].
+    ground
+        Shear of each storey per ground acceleration, and per its second derivative over the square of the highest
+        angular frequency in use, shape (n, 2) [kg]; zero for a frame whose modes are all in the band.
+    turning
+        Shear of each storey per rotation of each floor about the vertical, shape (n, turns) [N/rad].
+    """
+
+    stiffness: FloatArray
+    ground: FloatArray
+    turning: FloatArray
+
+    @classmethod
+    def of_displacements(cls, stiffness: FloatArray, turns: int = 0) -> Weighting:
+        """Return the weighting of a frame whose forces depend on the displacements alone, not on rotations."""
+        return cls(stiffness, np.zeros((len(stiffness), 2)), np.zeros((len(stiffness), turns)))
+
+
+@dataclass(frozen=True)
 class Motion:
     """Motion of a record in time, relative to the ground; shape (m, n), SI.
 
     `acceleration` is absolute and high-pass filtered at the band. `state_displacement` and `state_velocity` include the
     slow part that lasers measure, because memories and gaps of effects depend on it. `drift` and `drift_rate` are their
-    differences between floors, storey after storey, shape (n, m).
+    differences between floors, storey after storey, shape (n, m). `turn` and `turn_rate` are the rotation of the floors
+    about the vertical and its rate, shape (m, turns).
     """
 
     displacement: FloatArray
@@ -59,6 +85,8 @@ class Motion:
     state_velocity: FloatArray
     drift: FloatArray
     drift_rate: FloatArray
+    turn: FloatArray
+    turn_rate: FloatArray
 
 
 @dataclass(frozen=True)
@@ -76,8 +104,8 @@ class Spectra:
     target
         Shear force of each storey from inertia, shape (n, b) [N/sqrt(Hz)].
     regressors
-        Displacements, velocities (relative, n each), ground acceleration and its second derivative, then known loads;
-        shape (p, b).
+        Displacements, velocities (relative, n each), ground acceleration and its second derivative, then known loads,
+        and rotations of the floors and their rates; shape (p, b).
     weight
         Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
     variance
@@ -150,7 +178,9 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules |
     dt, corner = record.dt, INTEGRATION_SHARE * band.low_hz
     size, n = record.acceleration.shape
     pad = _padding(size, int(6.0 / (corner * dt)))
-    lines, frequencies = _padded_lines(np.column_stack([record.relative, record.acceleration, record.ground]), pad, dt)
+    turning = record.turning if record.turns else np.zeros((size, 0))
+    stack = np.column_stack([record.relative, record.acceleration, record.ground, turning])
+    lines, frequencies = _padded_lines(stack, pad, dt)
     keep = _high_pass(frequencies, corner)[:, None]
     omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)[:, None]
     total = size + 2 * pad
@@ -170,11 +200,15 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules |
             moved[:, floor - 1 : floor] = keep * (share * own + (1.0 - share) * integrated[:, floor - 1 : floor])
         slow = (seen * (1.0 - keep)) @ _over_floors(n, floors)
     displacement, velocity = back(moved), back(moved * 1j * omega)
-    filtered = back(lines[:, n:] * keep)
+    filtered = back(lines[:, n : 2 * n + 1] * keep)
+    turned = -lines[:, 2 * n + 1 :] / omega**2 * keep
     state, rate = displacement + back(slow), velocity + back(slow * 1j * omega)
     drift = np.ascontiguousarray(np.diff(state, axis=1, prepend=0.0).T)
     drift_rate = np.ascontiguousarray(np.diff(rate, axis=1, prepend=0.0).T)
-    return Motion(displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate)
+    return Motion(
+        displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate, back(turned),
+        back(turned * 1j * omega),
+    )  # fmt: skip
 
 
 def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> ComplexArray:
@@ -240,12 +274,46 @@ def storey_sums(floors: int) -> FloatArray:
     return np.triu(np.ones((floors, floors)))
 
 
+def gains_of_floors(
+    weighting: Weighting, masses: FloatArray, frequencies_hz: FloatArray, lasers: FloatArray
+) -> FloatArray:
+    """Return the error of each storey's equation per error of each floor's accelerometer, shape (n, n, b) [kg].
+
+    The accelerometer of a floor enters the inertia of the storeys below it and, integrated twice, the displacement.
+
+    Parameters
+    ----------
+    weighting
+        Linear frame by which errors are propagated.
+    masses
+        Floor masses, shape (n,) [kg].
+    frequencies_hz
+        Frequencies of the lines, shape (b,).
+    lasers
+        Share of each displacement that comes from a displacement sensor, shape (n, b).
+    """
+    inverse = (1.0 - lasers) / (2.0 * np.pi * frequencies_hz) ** 2
+    inertia = storey_sums(len(masses))[:, :, None] * masses[None, :, None]
+    return np.asarray(inertia - weighting.stiffness[:, :, None] * inverse)
+
+
+def gains_of_ground(weighting: Weighting, frequencies_hz: FloatArray, lasers: FloatArray) -> FloatArray:
+    """Return the error of each storey's equation per error of the ground's accelerometer, shape (n, b) [kg].
+
+    The displacements are relative to the ground, so that its error enters all of them.
+    """
+    omega = 2.0 * np.pi * frequencies_hz
+    relative = np.einsum("sl,lb->sb", weighting.stiffness, (1.0 - lasers) / omega**2)
+    direct = weighting.ground[:, :1] - weighting.ground[:, 1:] * omega**2 / omega[-1] ** 2
+    return np.asarray(relative - direct)
+
+
 def spectra_of(
     record: FrameRecord,
     masses: FloatArray,
     band: Band,
     noise: Noise,
-    stiffness: FloatArray,
+    weighting: Weighting,
     motion: Motion,
     rules: FrameRules | None = None,
 ) -> Spectra:
@@ -261,8 +329,8 @@ def spectra_of(
         Frequencies in use.
     noise
         Noise of the sensors.
-    stiffness
-        Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
+    weighting
+        Linear frame by which the noise is propagated; used for the weights only.
     motion
         Motion of the record in the time domain.
     rules
@@ -285,20 +353,46 @@ def spectra_of(
     for floor in range(1, n + 1):
         if floor in loads:
             parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
+    if record.turns:
+        parts += [spectrum_of(item, taper, dt, frequencies) for item in (motion.turn, motion.turn_rate)]
     target = spectrum_of(shear, taper, dt, frequencies)
     lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
-    inverse = (1.0 - lasers) / omega**2
-    by_floor = sums[:, :, None] * masses[None, :, None] - stiffness[:, :, None] * inverse
-    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
+    unweighted = Spectra(
+        record, motion, frequencies, taper, target, np.concatenate(parts), np.ones(target.shape),
+        np.ones(target.shape), lasers,
+    )  # fmt: skip
+    return reweighted(unweighted, masses, noise, weighting, rules)
+
+
+def reweighted(
+    spectra: Spectra, masses: FloatArray, noise: Noise, weighting: Weighting, rules: FrameRules | None = None
+) -> Spectra:
+    """Return spectra with the weights that follow from the noise of the sensors.
+
+    Parameters
+    ----------
+    spectra
+        Spectra of a record. If it has displacement sensors, their share in the motion is not changed.
+    masses
+        Shape (n,) [kg].
+    noise
+        Noise of the sensors.
+    weighting
+        Linear frame by which the noise is propagated.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    frequencies, lasers, n = spectra.frequencies_hz, spectra.laser_share, len(masses)
     sensors = noise.of_accelerometers(frequencies)
-    variance = np.einsum("slb,lb->sb", by_floor**2, sensors[1:])
-    variance += sensors[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
-    variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
+    variance = np.einsum("slb,lb->sb", gains_of_floors(weighting, masses, frequencies, lasers) ** 2, sensors[1:])
+    variance += sensors[0] * gains_of_ground(weighting, frequencies, lasers) ** 2
+    turning = noise.of_turning(frequencies) / (2.0 * np.pi * frequencies) ** 4
+    variance += np.einsum("sc,cb->sb", weighting.turning**2, turning)
+    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
+    variance += np.einsum("sl,lb->sb", weighting.stiffness**2, of_lasers)
     # the noise of a load cell enters the equation of every storey below the load
     for floor, density in noise.loads.items():
         variance[:floor] += density
-    own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
+    own = np.mean(np.abs(spectra.target) ** 2, axis=1, keepdims=True)
     variance = variance + (rules or FrameRules()).model_floor ** 2 * own
-    return Spectra(
-        record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance, lasers
-    )
+    return replace(spectra, weight=np.sqrt(2.0 / variance), variance=variance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,9 +16,14 @@ from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
-from mrpipe.tracing.structure.fault_search import likely_fault
-from mrpipe.tracing.structure.fit import design_of
-from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.exchange import exchanged_floors
+from mrpipe.tracing.structure.fault_and_effect import (
+    FaultAndEffect,
+    effect_after,
+    fault_and_effect,
+    leaves_nothing,
+    promising_fault,
+)
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
 from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests, in_words
@@ -26,7 +31,7 @@ from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.rounds import FrameCandidate, FrameSelection
 from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import select
-from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
+from mrpipe.tracing.structure.sensor_faults import SensorFault
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, NamedEffect, Unexplained, Verdict
 from mrpipe.words import listed
@@ -112,45 +117,77 @@ def trace_frame(
     problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg, frame_rules)
     _require_length(problem, data)
     progress(0.2, "spectra")
-    selection = select(
-        problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
-    )
-    about = selection.about
-    fault = _sensor_fault(problem, selection, rules)
-    reason = _because_of(fault) if fault else _unnamed(selection, rules)
-    chosen = selection.chosen[: selection.declared] if reason else selection.chosen
+
+    def choose(given: FrameProblem, most: int) -> FrameSelection:
+        return select(
+            given, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
+        )
+
+    found = _diagnosis(problem, rules, most, choose)
+    problem, selection, about = found.problem, found.selection, found.selection.about
+    chosen = selection.chosen[: selection.declared] if found.reason else selection.chosen
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
     after = model_of(selection.design, chosen, about)
     progress(0.85, "errors on validation tests")
     between = stiffness_between_tests(after, _in_order(problem, data), problem.rules)
-    if fault:
+    if found.fault:
         # a faulty sensor in one test looks like a change of the stiffness
         between = replace(between, kind="constant", change=0.0, step_before="", storey=0)
     differing = differing_tests(after, problem, selection.groups.scale, problem.rules.differing_floors)
-    summary = _summary(problem, selection, before, after, between, declared, rules, reason, differing)
-    summary["frame"]["sensor_fault"] = fault.as_json() if fault else None
+    summary = _summary(problem, selection, before, after, between, declared, rules, found.reason, differing)
+    if found.both:
+        summary = found.both.in_summary(summary, problem.rules)
+    elif found.fault:
+        # a linear frame fits exchanged floors as well, so that the residual may be noise
+        summary |= Verdict("unknown", found.reason).sentence_as_json()
+    summary["frame"]["sensor_fault"] = found.fault.as_json() if found.fault else None
     return FrameTracing(summary, problem, selection, before, after, between)
 
 
-def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
-    """Return the fault of a sensor that leaves nothing unexplained, where effects leave something."""
-    if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
-        return None
-    design = design_of("linear-frame", problem.training)
-    fault = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
-    if fault is None:
-        return None
-    # the noise was estimated with the faulty sensor: fit the repaired records again
-    training, validation = (
-        [repaired(item.record, fault) for item in items] for items in (problem.training, problem.validation)
-    )
-    again = frame_problem(training, validation, problem.masses_kg, problem.rules)
-    design = design_of("linear-frame", again.training)
-    return None if groups_of(design, problem.rules).material(design.residual) else fault
+@dataclass(frozen=True)
+class _Diagnosis:
+    """What the residual of the linear frame is: effects, a fault of a sensor, or both.
+
+    Attributes
+    ----------
+    problem, selection
+        Spectra of the records, corrected for the fault if there are also effects, and the effects.
+    reason
+        Why no effect is named; empty if the chosen effects are named.
+    fault
+        Fault of a sensor; None if there is none.
+    both
+        The fault and the effects, if both are reported.
+    """
+
+    problem: FrameProblem
+    selection: FrameSelection
+    reason: str
+    fault: SensorFault | None = None
+    both: FaultAndEffect | None = None
 
 
-def _because_of(fault: SensorFault) -> str:
-    return f"{fault.sentence()}, which explains what is missing; correct the channel, and trace again"
+def _diagnosis(
+    problem: FrameProblem, rules: NamingRules, most: int, choose: Callable[[FrameProblem, int], FrameSelection]
+) -> _Diagnosis:
+    def select_all(given: FrameProblem) -> FrameSelection:
+        return choose(given, most)
+
+    exchange = exchanged_floors(problem)
+    # the drifts of exchanged floors are wrong, and so would be the effects that act on them
+    selection = choose(problem, 0 if exchange else most)
+    fault = exchange or promising_fault(problem, selection, rules)
+    if exchange:
+        both = effect_after(exchange, problem, selection, rules, select_all)
+    elif fault and leaves_nothing(fault, problem):
+        return _Diagnosis(problem, selection, fault.reason(), fault)
+    else:
+        both = fault_and_effect(fault, problem, selection, rules, select_all)
+    if both:
+        return _Diagnosis(both.problem, both.selection, "", both.fault, both)
+    if exchange:
+        return _Diagnosis(problem, selection, exchange.reason(), exchange)
+    return _Diagnosis(problem, selection, _unnamed(selection, rules))
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:

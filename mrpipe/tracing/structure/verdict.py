@@ -32,6 +32,12 @@ class History:
     dims: tuple[str, ...]
 
 
+TURNING = (
+    "each direction is traced by itself; the rotation of the floors about the vertical, which the sensors measure, is "
+    "part of its linear frame"
+)
+"""Note in the result on structures whose sensors measure the rotation of all floors."""
+
 UNCOUPLED = (
     "each direction is traced by itself: forces that couple the directions, such as torsion, are not modelled; they "
     "count as unexplained, and an effect may imitate them"
@@ -128,8 +134,10 @@ def trace_structure(
         )  # fmt: skip
     summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
     if directions := [axis for axis in frames if axis]:
-        summary["directions"] = {"traced": directions, "coupling_modelled": False, "statement": UNCOUPLED}
-        findings.append(UNCOUPLED)
+        coupled = all(frames[axis].problem.training[0].record.turns for axis in directions)
+        said = TURNING if coupled else UNCOUPLED
+        summary["directions"] = {"traced": directions, "coupling_modelled": coupled, "statement": said}
+        findings.append(said)
         if any("damper_force" in test.channels for item in campaigns for test in item.recordings):
             findings.append("the damper is not traced, because the sensors of the structure measure in directions")
     if not frames:

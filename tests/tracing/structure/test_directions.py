@@ -12,9 +12,14 @@ from mrpipe.campaigns import Campaign, Recording
 from mrpipe.effects.structural.library import all_structural_effects
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.structure.base import frame_problem
 from mrpipe.tracing.structure.directions import directions_of, in_direction
+from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.records import frame_data
 from mrpipe.tracing.structure.verdict import trace_structure
 from tests.tracing.structure.rig import frame_campaign
+from tests.tracing.structure.towers import eccentric_building
 
 
 def two_directions(along: Campaign, across: Campaign) -> Campaign:
@@ -45,11 +50,38 @@ def test_an_effect_in_one_direction_is_named_there() -> None:
     found = trace_structure([campaign], effects, {}, options, rng=np.random.default_rng(1))
     assert [item["name"] for item in found.summary["effects"]] == ["cubic-stiffness"]
     assert found.summary["part"] == "frame y"
-    assert found.summary["directions"]["coupling_modelled"] is False
+    assert found.summary["directions"]["coupling_modelled"] is True
     assert any(line.startswith("the damper is not traced") for line in found.findings)
-    assert sum("forces that couple the directions" in line for line in found.findings) == 1
+    assert sum("rotation of the floors about the vertical" in line for line in found.findings) == 1
     assert found.summary["parts"]["frame x"]["effects"] == []
     assert {name.partition("/")[0] for name in found.histories} == {"x", "y"}
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_the_rotation_of_an_eccentric_building_is_part_of_its_linear_frame(axis: str) -> None:
+    """Without the rotation, the coupling of the directions is a residual far above the noise."""
+    part = in_direction(eccentric_building(), axis)
+    assert part is not None
+    data = frame_data(part)
+    for turning, missing in ((True, False), (False, True)):
+        records = data.records if turning else [replace(item, turning=item.turning[:, :0]) for item in data.records]
+        problem = frame_problem(records[:2], records[2:], data.masses_kg)
+        assert problem.training[0].record.turns == (3 if turning else 0)
+        design = design_of("linear-frame", problem.training)
+        assert groups_of(design).material(design.residual) is missing
+
+
+@pytest.mark.property
+def test_rotations_are_used_only_if_the_sensors_of_every_floor_determine_them() -> None:
+    campaign = eccentric_building()
+    first = campaign.recordings[0]
+    channels = {name: values for name, values in first.channels.items() if name != "floor_acceleration_2_y2"}
+    fewer = replace(campaign, recordings=(replace(first, channels=channels), *campaign.recordings[1:]))
+    for given, known in ((campaign, True), (fewer, False)):
+        part = in_direction(given, "y")
+        assert part is not None
+        assert all(("floor_turn_2" in item.channels) is known for item in part.recordings)
 
 
 @pytest.mark.property

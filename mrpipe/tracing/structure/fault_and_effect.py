@@ -1,0 +1,208 @@
+"""A faulty sensor and a missing effect in one campaign: neither of them alone explains the residual.
+
+The fault is sought in the residual of the linear frame and, where an effect explains most of it, in the residual with
+this effect. The records are corrected, and effects are selected again. The force of the effect is then subtracted, so
+that gain and delay of the sensor are fitted without it, and the records are corrected with these values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrpipe.tracing.options import NamingRules
+from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.structure.base import FrameProblem, frame_problem
+from mrpipe.tracing.structure.fault_search import likely_fault, with_smaller_residual
+from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.model import model_of
+from mrpipe.tracing.structure.rounds import FrameSelection
+from mrpipe.tracing.structure.scores import frame_score
+from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
+from mrpipe.tracing.structure.spectra import Spectra
+from mrpipe.tracing.verdict import Score, Verdict
+from mrpipe.words import listed
+
+Select = Callable[[FrameProblem], FrameSelection]
+"""Selection of effects on a problem."""
+
+
+@dataclass(frozen=True)
+class FaultAndEffect:
+    """A fault of a sensor, and the effects that explain what it leaves.
+
+    Attributes
+    ----------
+    fault
+        The fault.
+    problem
+        Spectra of the corrected records.
+    selection
+        Linear frame and effects on them.
+    recorded
+        Errors of the linear frame without these effects on the validation records as they were recorded.
+    """
+
+    fault: SensorFault
+    problem: FrameProblem
+    selection: FrameSelection
+    recorded: Score
+
+    def in_summary(self, summary: dict[str, Any], rules: FrameRules) -> dict[str, Any]:
+        """Return the summary of the corrected records, with the errors of the recorded ones before, and the fault.
+
+        Parameters
+        ----------
+        summary
+            The JSON of docs/close-loop-json.md.
+        rules
+            Decision thresholds; effects of a campaign with a faulty sensor are as probable as each of several effects.
+        """
+        most = rules.probability_of_several
+        effects = [{**item, "confidence": min(item["confidence"], most)} for item in summary["effects"]]
+        names = listed([f"{item['name']} ({item['place']})" for item in effects])
+        sentence = f"{names}: explains what a fault of a sensor leaves ({self.fault.sentence()}); correct the channel"
+        if differing := [item["name"] for item in summary["frame"]["differing_tests"]]:
+            sentence += f"; the error of {listed(differing)} exceeds the noise nevertheless"
+        tests = [{**item, "nrmse_before": self.recorded.by_test[item["name"]]} for item in summary["tests"]]
+        verdict = Verdict("partly explained", sentence).sentence_as_json()
+        return {**summary, **verdict, "effects": effects, "before": self.recorded.as_json(), "tests": tests}
+
+
+def promising_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
+    """Return the fault of a sensor that removes most of the residual of the linear frame, where effects leave some.
+
+    Parameters
+    ----------
+    problem
+        Spectra of the records.
+    selection
+        Linear frame and effects, as chosen on the training records.
+    rules
+        Rules for naming an effect.
+    """
+    if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
+        return None
+    design = design_of("linear-frame", problem.training)
+    return likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
+
+
+def leaves_nothing(fault: SensorFault, problem: FrameProblem) -> bool:
+    """Return whether the residual of a linear frame is noise once the records are corrected for a fault.
+
+    Parameters
+    ----------
+    fault
+        The fault.
+    problem
+        Spectra of the records as they were recorded. The noise was estimated with the faulty sensor, and is estimated
+        again.
+    """
+    design = design_of("linear-frame", _repaired(problem, fault).training)
+    return not groups_of(design, problem.rules).material(design.residual)
+
+
+def fault_and_effect(
+    fault: SensorFault | None, problem: FrameProblem, selection: FrameSelection, rules: NamingRules, choose: Select
+) -> FaultAndEffect | None:
+    """Return the fault of a sensor and the effects that together explain the residual; None if none do.
+
+    Parameters
+    ----------
+    fault
+        Fault that removes most of the residual of the linear frame; None if none does.
+    problem
+        Spectra of the records.
+    selection
+        Linear frame and effects, as chosen on the training records without any fault.
+    rules
+        Rules for naming an effect.
+    choose
+        Selection of effects on a problem.
+    """
+    if not selection.structured or selection.share(selection.remaining) >= rules.named_share:
+        return None
+    for start in _possible(fault, problem, selection, rules.least_share):
+        again, found = _traced(problem, start, choose)
+        if len(found.chosen) <= found.declared or found.share(found.residual) < rules.least_share:
+            continue
+        refined = with_smaller_residual(start, without_effects(again.training, found), problem.masses_kg)
+        # what an effect leaves because of its form also looks like a small error of a gain
+        if not refined.exceeds(problem.rules.same_gain, problem.band.high_hz):
+            continue
+        both = effect_after(refined, problem, selection, rules, choose)
+        if both is not None:
+            return both
+    return None
+
+
+def effect_after(
+    fault: SensorFault, problem: FrameProblem, selection: FrameSelection, rules: NamingRules, choose: Select
+) -> FaultAndEffect | None:
+    """Return the effects that explain what is missing in records that are corrected for a fault; None if none do.
+
+    Parameters
+    ----------
+    fault
+        Fault of a sensor.
+    problem, selection
+        Spectra of the records as they were recorded, and the linear frame that was fitted to them.
+    rules
+        Rules for naming an effect.
+    choose
+        Selection of effects on a problem.
+    """
+    again, found = _traced(problem, fault, choose)
+    if len(found.chosen) <= found.declared or found.share(found.residual) < rules.named_share:
+        return None
+    known = selection.chosen[: selection.declared]
+    recorded = frame_score(model_of(selection.design, known, selection.about), problem.validation)
+    return FaultAndEffect(fault, again, found, recorded)
+
+
+def _possible(
+    fault: SensorFault | None, problem: FrameProblem, selection: FrameSelection, least_share: float
+) -> Iterator[SensorFault]:
+    """Yield the given fault, and the one that removes most of the residual with the chosen effects."""
+    if fault is not None:
+        yield fault
+    if len(selection.chosen) > selection.declared:
+        design = design_of("linear-frame", without_effects(problem.training, selection))
+        found = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, least_share)
+        if found is not None:
+            yield found
+
+
+def _traced(problem: FrameProblem, fault: SensorFault, choose: Select) -> tuple[FrameProblem, FrameSelection]:
+    again = _repaired(problem, fault)
+    return again, choose(again)
+
+
+def _repaired(problem: FrameProblem, fault: SensorFault) -> FrameProblem:
+    """Return the problem of the records that are corrected for a fault, with noise that is estimated again."""
+    training, validation = (
+        [repaired(item.record, fault) for item in items] for items in (problem.training, problem.validation)
+    )
+    return frame_problem(training, validation, problem.masses_kg, problem.rules)
+
+
+def without_effects(spectra: Sequence[Spectra], selection: FrameSelection) -> tuple[Spectra, ...]:
+    """Return spectra whose storey forces do not contain the forces of the chosen effects.
+
+    Parameters
+    ----------
+    spectra
+        Spectra of the records on which the effects were chosen.
+    selection
+        The chosen effects.
+    """
+    model = model_of(selection.design, selection.chosen, selection.about)
+    columns = [model.columns(item) for item in spectra]
+    return tuple(
+        item if own is None else replace(item, target=item.target - np.tensordot(model.amplitudes, own.lines, axes=1))
+        for item, own in zip(spectra, columns, strict=True)
+    )
