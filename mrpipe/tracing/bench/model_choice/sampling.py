@@ -1,8 +1,8 @@
 """Rate at which models are fitted: the given rate, or a multiple of it if the error is then clearly smaller.
 
 Forces are picked from the records at a reduced rate, because most of them change slowly. A force that depends on
-velocity, or the end of a free play, changes within a few milliseconds. The model cannot represent this change between
-two samples of a reduced rate, and its parameters become biased. Only a model with the effect shows this.
+velocity, or that went through a filter, changes within a few milliseconds. The model cannot represent this change
+between two samples of a reduced rate, and its parameters become biased. Only a model with the effect shows this.
 """
 
 from __future__ import annotations
