@@ -202,10 +202,16 @@ def require_known_laws(header: CampaignHeader) -> None:
 
 def known_effects() -> set[str]:
     """Return the names of all effects of the library."""
-    from mrpipe.effects.library import all_effects
     from mrpipe.effects.structural.library import all_structural_effects
 
-    return {*all_effects(), *all_structural_effects()}
+    return {*known_damper_effects(), *all_structural_effects()}
+
+
+def known_damper_effects() -> set[str]:
+    """Return the names of the effects of a damper in the library."""
+    from mrpipe.effects.library import all_effects
+
+    return set(all_effects())
 
 
 def check_campaigns(loaded: LoadedConfig) -> CheckResult:
