@@ -94,6 +94,8 @@ def columns_of(file: DataFile) -> list[Column]:
 
 def separator_of(file: DataFile) -> str:
     """Return the sign between a group and a channel in the names of a file's columns, empty where it has no groups."""
+    if file.separator:
+        return file.separator
     paths = [name for name in file.names if "/" in name]
     return "/" if paths else "" if file.table else "."
 
