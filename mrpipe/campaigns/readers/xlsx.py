@@ -18,7 +18,7 @@ SEPARATOR = "!"
 """Sign between a sheet and a column, as in Excel's own references."""
 
 FEWEST_ROWS = 40
-"""A further sheet with fewer rows is no record of a test."""
+"""A further sheet with fewer rows is not a record of a test."""
 
 
 def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
