@@ -193,7 +193,7 @@ def require_known_laws(header: CampaignHeader) -> None:
             raise source.error(
                 place,
                 f"unknown control law {law!r}",
-                f"{nearest(law, set(law_names()))}; for a law of your own, leave out the keys law and gains",
+                f"{nearest(law, set(law_names()))}; if it is another law, leave out the keys law and gains",
             )
         known = {item.name for item in law_named(law).gains}
         for name in gains:
