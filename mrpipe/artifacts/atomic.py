@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -29,7 +29,9 @@ def atomic_path(final: Path) -> Iterator[Path]:
             error.filename, error.filename2 = str(final), None
         raise
     finally:
-        temporary.unlink(missing_ok=True)
+        # where nothing can be written, nothing can be removed, and the first error says why
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def atomic_write_text(final: Path, text: str) -> None:

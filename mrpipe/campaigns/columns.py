@@ -56,6 +56,8 @@ class DataFile:
     accelerations
         Columns that are known to be accelerations [m/s^2], as those of strong-motion records are: name -> whether
         horizontal.
+    separator
+        Sign between a group and a column in the names, where it is not that of paths.
     """
 
     path: Path
@@ -72,6 +74,7 @@ class DataFile:
     units: Mapping[str, str] = field(default_factory=dict)
     clocks: Mapping[str, tuple[float, float, int]] = field(default_factory=dict)
     accelerations: Mapping[str, bool] = field(default_factory=dict)
+    separator: str = ""
 
     def line_of(self, sample: int) -> int:
         """Return the line of a sample in a text file, for messages; its number from 0 where lines mean nothing."""

@@ -47,6 +47,12 @@ def refuse_wrong_campaigns(pipeline: Pipeline, names: Collection[str]) -> None:
             require_motion(pipeline.loaded, campaign)
         if campaign.rig == "damper-bench" and "train-inverse" in needed:
             require_drives(campaign)
+        if (
+            "identify-frame" in needed
+            and "campaign:frame" in pipeline.stages["identify-frame"].inputs
+            and key == "frame"
+        ):
+            require_frame_tests(campaign)
 
 
 def refuse_constant_drive(pipeline: Pipeline, names: Collection[str]) -> None:
@@ -96,6 +102,19 @@ def require_drives(campaign: Campaign) -> None:
 
     drives = {test.name: test.used("drive") for test in campaign.with_role("training")}
     require_varying(drives, str(campaign.file))
+
+
+def require_frame_tests(campaign: Campaign) -> None:
+    """Refuse a campaign of a structure whose tests lack what the identification of the frame needs.
+
+    Raises
+    ------
+    UserError
+        If no test shows modes, a forced test has no measured excitation, or a floor is not one of the frame.
+    """
+    from mrpipe.modal.records import frame_tests
+
+    frame_tests(campaign)
 
 
 def _is_read(pipeline: Pipeline, needed: Collection[str], key: str) -> bool:

@@ -191,7 +191,9 @@ def require_known_laws(header: CampaignHeader) -> None:
         if law not in law_names():
             place = ("tests", index, "law")
             raise source.error(
-                place, f"unknown control law {law!r}", f"{nearest(law, set(law_names()))}; leave out your own law"
+                place,
+                f"unknown control law {law!r}",
+                f"{nearest(law, set(law_names()))}; if it is another law, leave out the keys law and gains",
             )
         known = {item.name for item in law_named(law).gains}
         for name in gains:
@@ -202,10 +204,16 @@ def require_known_laws(header: CampaignHeader) -> None:
 
 def known_effects() -> set[str]:
     """Return the names of all effects of the library."""
-    from mrpipe.effects.library import all_effects
     from mrpipe.effects.structural.library import all_structural_effects
 
-    return {*all_effects(), *all_structural_effects()}
+    return {*known_damper_effects(), *all_structural_effects()}
+
+
+def known_damper_effects() -> set[str]:
+    """Return the names of the effects of a damper in the library."""
+    from mrpipe.effects.library import all_effects
+
+    return set(all_effects())
 
 
 def check_campaigns(loaded: LoadedConfig) -> CheckResult:
@@ -235,7 +243,7 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
         result.findings[key] = [
             *judge(campaign),
             *_too_short(loaded, campaign),
-            *_refused_by_stages(loaded, campaign),
+            *_refused_by_stages(loaded, key, campaign),
             *_no_validation(loaded, key, campaign),
         ]
         if key == "closed_loop":
@@ -293,14 +301,16 @@ def _too_short(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
     return find_short_tests(campaign, setting_named(loaded.config, "prepare"))
 
 
-def _refused_by_stages(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
-    """Return what stages of the configuration refuse of a bench campaign, with the message of the stage."""
-    if campaign.rig != "damper-bench":
-        return []
-    from mrpipe.cli.campaign_refusal import require_drives, require_motion
+def _refused_by_stages(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[Finding]:
+    """Return what stages of the configuration refuse of a campaign, with the message of the stage."""
+    from mrpipe.cli.campaign_refusal import require_drives, require_frame_tests, require_motion
 
     needed = needed_stages(loaded)
     found = []
+    if key == "frame" and "identify-frame" in needed and "campaign:frame" in _stages(loaded)["identify-frame"].inputs:
+        found.append(_refusal("no-frame-tests", lambda: require_frame_tests(campaign)))
+    if campaign.rig != "damper-bench":
+        return [item for item in found if item is not None]
     if "prepare" in needed:
         found.append(_refusal("no-acceleration", lambda: require_motion(loaded, campaign)))
     if "train-inverse" in needed:
@@ -329,10 +339,13 @@ def _refusal(name: str, require: Callable[[], None]) -> Finding | None:
 
 def needed_stages(loaded: LoadedConfig) -> set[str]:
     """Return the stages that `mrpipe run` builds: those of the configuration, and those that they cannot do without."""
+    return with_required(_stages(loaded), loaded.config.stages)
+
+
+def _stages(loaded: LoadedConfig) -> dict[str, Stage]:
     from mrpipe.stages.registry import stages_for
 
-    stages = {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
-    return with_required(stages, loaded.config.stages)
+    return {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
 
 
 def with_required(stages: Mapping[str, Stage], names: Collection[str]) -> set[str]:
@@ -356,10 +369,8 @@ def stages_without_data(loaded: LoadedConfig) -> dict[str, str]:
     UserError
         If no stage has data.
     """
-    from mrpipe.stages.registry import stages_for
-
     campaigns = loaded.config.campaigns.model_dump()
-    stages = {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
+    stages = _stages(loaded)
     without: dict[str, str] = {}
 
     def missing(name: str) -> str:

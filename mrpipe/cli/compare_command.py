@@ -19,7 +19,7 @@ _WIDEST = 48
 _ROWS_OF_A_STAGE = 12
 
 
-@with_common_options("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force", "quiet")
+@with_common_options("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force")
 def compare(
     options: CommonOptions,
     first: Annotated[Path, typer.Argument(metavar="RUN", help="First run directory.")],

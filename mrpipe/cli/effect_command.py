@@ -12,7 +12,7 @@ from mrpipe.errors import CheckFailed
 from mrpipe.words import shell_word
 
 
-@with_common_options("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force", "quiet")
+@with_common_options("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force")
 def check_effect(
     options: CommonOptions,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Python file that defines EFFECT.")],
@@ -46,12 +46,14 @@ def check_effect(
         print(f"{file}: effect {effect.name!r} of a {rig}, acts on {effect.acts_on}; source: {effect.source}")
         for item in checks:
             place = f"{item.form}: " if item.form else ""
+            if options.quiet and item.passed:
+                continue
             print(f"  {'ok    ' if item.passed else 'FAILED'}  {place}{item.demand}")
             if item.failure:
                 print(f"          {item.failure}")
     if failed:
         raise CheckFailed(f"{file}: {len(failed)} of {len(checks)} demands are not met")
-    if not options.json:
+    if not options.json and not options.quiet:
         print(f"all {len(checks)} demands are met")
         print(f"next: mrpipe close-loop --campaign DIR --set {shell_word(f'close_loop.effect_files=[{file}]')}")
 

@@ -64,7 +64,7 @@ def show(
         print_any(description)
 
 
-@with_common_options("run", "jobs", "seed", "force")
+@with_common_options("jobs", "force")
 def check(
     options: CommonOptions,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,6 +30,13 @@ class CommonOptions:
     json: bool = False
 
 
+_RUN = "Run directory. Default: runs/NAME, with the name of the configuration, or of the campaign of --campaign."
+_RUN_OF = {
+    frozenset({"campaign"}): "Run directory. Default: runs/NAME, with the name of the configuration.",
+    frozenset({"campaign", "config"}): "Run directory. Default: runs/demo.",
+}
+"""Options that a command does not have -> help of --run, which otherwise names them."""
+
 _COMMON: dict[str, tuple[Any, Any]] = {
     "config": (
         Annotated[
@@ -47,8 +54,7 @@ _COMMON: dict[str, tuple[Any, Any]] = {
             Path | None,
             typer.Option(
                 metavar="DIR",
-                help="Run directory. Default: runs/NAME, with the name of the configuration, or of the campaign of "
-                "--campaign.",
+                help=_RUN,
             ),
         ],
         None,
@@ -130,6 +136,12 @@ def one_config(named: Path | None, positional: Path | None) -> Path | None:
     return chosen
 
 
+def _run_option(left_out: Collection[str]) -> Any:
+    """Return the option --run, whose help names no option that the command does not have."""
+    text = _RUN_OF.get(frozenset({"campaign", "config"} & set(left_out)), _RUN)
+    return Annotated[Path | None, typer.Option(metavar="DIR", help=text)]
+
+
 def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Give a command the common options (but those left out); it gets them as one `options` argument.
 
@@ -146,6 +158,7 @@ def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Calla
             )
         for name, (annotation, default) in _COMMON.items():
             if name not in left_out:
+                annotation = _run_option(left_out) if name == "run" else annotation
                 parameters.append(
                     inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
                 )

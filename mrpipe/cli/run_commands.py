@@ -149,7 +149,7 @@ def _write_report(pipeline: Pipeline) -> list[Path]:
     return write_report(run_facts(pipeline), pipeline.loaded.config.report.formats)
 
 
-@with_common_options("campaign", "jobs", "seed", "force", "positional")
+@with_common_options("jobs", "force", "positional")
 def report(
     options: CommonOptions,
     directory: Annotated[

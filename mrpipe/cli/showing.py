@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import UserError
 from mrpipe.words import shell_word
+
+if TYPE_CHECKING:
+    from mrpipe.campaigns.header import CampaignHeader
+    from mrpipe.campaigns.plausibility import Finding
 
 MOST_CHANNELS = 8
 MOST_ROWS = 400
@@ -27,17 +31,59 @@ def describe_any(path: Path) -> dict[str, Any]:
 
     if path.is_dir():
         if (path / CAMPAIGN_FILE).is_file():
-            return {**describe_file(path), "units": _units_of(path / CAMPAIGN_FILE)}
+            return _describe_campaign(path / CAMPAIGN_FILE)
         if (path / "manifests").is_dir() or (path / "config.yaml").is_file():
             return _describe_run(path)
         return _refuse_folder(path)
     if path.suffix.lower() in {".yaml", ".yml"}:
-        return {**describe_file(path), "units": _units_of(path)}
+        return _describe_campaign(path)
     if path.suffix.lower() == ".json":
         return _describe_json(path)
     if path.suffix.lower() in {".h5", ".hdf5"} and _is_artifact(path):
         return describe_file(path)
     return _describe_data(path)
+
+
+def _describe_campaign(file: Path) -> dict[str, Any]:
+    """Return what a campaign holds, the units of its file, and a finding for each unknown effect that it declares."""
+    from mrpipe.campaigns.header import read_header
+    from mrpipe.reporting.contents import describe_file
+
+    content = describe_file(file)
+    unknown = unknown_effects(read_header(file))
+    content["findings"] += [item.line for item in unknown]
+    content["plausibility"] += [item.as_dict() for item in unknown]
+    return {**content, "units": _units_of(file)}
+
+
+def unknown_effects(header: CampaignHeader) -> list[Finding]:
+    """Return a warning for each declared effect that the library does not hold, with the names that are valid.
+
+    The user's own effects belong to a configuration, so they are unknown here.
+    """
+    if not header.declared_effects:
+        return []
+    from mrpipe.artifacts.yaml_source import nearest
+    from mrpipe.campaigns.plausibility import Finding
+    from mrpipe.cli.checking import known_damper_effects, known_effects
+
+    known = known_effects() if header.rig == "shear-frame" else known_damper_effects()
+    found = []
+    for index, name in enumerate(header.declared_effects):
+        if name in known:
+            continue
+        likely = nearest(name, known)
+        likely = "" if likely.startswith("known") else f"{likely} "
+        found.append(
+            Finding(
+                name="effect-unknown",
+                severity="warning",
+                sentence=f"declared_effects[{index}]: {name!r} is not an effect of a {header.rig} campaign",
+                remedy=f"{likely}valid names: {', '.join(sorted(known))}, and the effect "
+                "of your own file, if close_loop.effect_files of the configuration names it",
+            )
+        )
+    return found
 
 
 def _is_artifact(path: Path) -> bool:

@@ -59,7 +59,10 @@ def build_and_print(
             _require_use(names, pipeline, options.campaign)
         if options.force:
             pipeline.force = frozenset(names)
-        refuse_constant_drive(pipeline, names)
+        if where_possible:
+            names = _without_constant_drive(pipeline, names)
+        else:
+            refuse_constant_drive(pipeline, names)
         outcomes = [pipeline.build(name) for name in names]
     outcomes = _with_data(outcomes, where_possible)
     if options.json:
@@ -80,6 +83,22 @@ def build_and_print(
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}; next: mrpipe report {shell_word(pipeline.run_directory)}")
     _raise_failures(outcomes, pipeline)
+
+
+def _without_constant_drive(pipeline: Pipeline, names: Sequence[str]) -> list[str]:
+    """Return the stages that can be built with the drive of the campaign; the others are named on standard error."""
+    from mrpipe.cli.campaign_refusal import refuse_constant_drive
+
+    possible = []
+    for name in names:
+        try:
+            refuse_constant_drive(pipeline, [name])
+        except UserError as error:
+            reason = f"the {error.where} {error.problem}, and an inverse model needs two drives"
+            print(f"{name} is left out: {reason}", file=sys.stderr)
+            continue
+        possible.append(name)
+    return possible
 
 
 def _with_data(outcomes: Sequence[Outcome], where_possible: bool) -> list[Outcome]:

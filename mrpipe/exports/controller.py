@@ -44,14 +44,16 @@ _INNER_MACROS = tuple(
     name for name in vars(kernel) if name.isupper() and isinstance(getattr(kernel, name), int) and name not in _MACROS
 )
 
+DRIVE = "drive"
+"""Unit of a quantity that is in the unit of the drive, A or V."""
 
 PARAMETERS: dict[str, tuple[int, str, str]] = {
     "c_n_s_m": (kernel.GAIN_C, "N*s/m", "gain: viscosity"),
     "k_n_m": (kernel.GAIN_K, "N/m", "gain: stiffness"),
     "alpha_n_m": (kernel.GAIN_ALPHA, "N/m", "gain: friction with negative stiffness"),
     "residual_force": (kernel.RESIDUAL_FORCE, "N", "desired force below which the drive is 0"),
-    "drive_limit": (kernel.DRIVE_LIMIT, "drive", "largest drive"),
-    "safe_drive": (kernel.SAFE_DRIVE, "drive", "drive while the readings cannot be used"),
+    "drive_limit": (kernel.DRIVE_LIMIT, DRIVE, "largest drive"),
+    "safe_drive": (kernel.SAFE_DRIVE, DRIVE, "drive while the readings cannot be used"),
     "kalman_displacement": (kernel.KALMAN, "1", "gain of the Kalman filter on the displacement"),
     "kalman_velocity": (kernel.KALMAN + 1, "1/s", "gain of the Kalman filter on the velocity"),
     "kalman_bias": (kernel.KALMAN + 2, "1/s^2", "gain of the Kalman filter on the bias of the accelerometer"),
@@ -86,10 +88,11 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
         Further entries of controller.json (where gains come from, units).
     """
     law = law_named(controller.law)
-    vectors = controller_vectors(controller, float(details.get("stroke_m", 0.01)))
+    unit = str(details.get("drive_unit", DRIVE))
+    vectors = controller_vectors(controller, float(details.get("stroke_m", 0.01)), unit)
     upper = prefix.upper()
     return {
-        "controller.h": _header(controller, prefix),
+        "controller.h": _header(controller, prefix, unit),
         "controller.c": c_text.in_either_precision(_source(controller, law, prefix), prefix),
         "controller.json": json.dumps(_description(controller, prefix, details), indent=2) + "\n",
         "vectors.csv": vectors.as_csv(),
@@ -110,7 +113,7 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
     }
 
 
-def controller_vectors(controller: Controller, stroke_m: float) -> Vectors:
+def controller_vectors(controller: Controller, stroke_m: float, drive_unit: str = DRIVE) -> Vectors:
     """Return readings of sensors and the commands of the controller in Python.
 
     The damper moves harmonically, then its motion decays. The readings have a ripple, as measured ones have noise, and
@@ -122,6 +125,8 @@ def controller_vectors(controller: Controller, stroke_m: float) -> Vectors:
         The controller.
     stroke_m
         Largest displacement of the damper [m].
+    drive_unit
+        Unit of the drive, A or V; `drive` where it is not known.
     """
     time = controller.sample_time_s * np.arange(VECTOR_ROWS)
     omega = 2.0 * np.pi * 0.75 / controller.options.extremum_memory_s
@@ -150,7 +155,7 @@ def controller_vectors(controller: Controller, stroke_m: float) -> Vectors:
     return Vectors(
         tuple(Channel(name, _UNITS.get(name, "m/s^2"), measured[:, place]) for place, name in sorted(inputs.items())),
         tuple(
-            Channel(name, _UNITS.get(name, "1"), commands[:, place], name in _FLAGS)
+            Channel(name, _in_unit(_UNITS.get(name, "1"), drive_unit), commands[:, place], name in _FLAGS)
             for place, name in sorted(outputs.items())
         ),
         controller.sample_time_s,
@@ -174,14 +179,19 @@ _UNITS = {
     "ground": "m/s^2",
     "force": "N",
     "unclipped": "N",
-    "drive": "drive",
-    "inverse": "drive",
+    "drive": DRIVE,
+    "inverse": DRIVE,
 }
 
 _FLAGS = frozenset({"clipped", "switched", "fault"})
 
 
-def _header(controller: Controller, prefix: str) -> str:
+def _in_unit(unit: str, drive_unit: str) -> str:
+    """Return a unit, which is that of the drive where a table says `drive`."""
+    return drive_unit if unit == DRIVE else unit
+
+
+def _header(controller: Controller, prefix: str, drive_unit: str) -> str:
     upper = prefix.upper()
     lines = [
         f"/* Controller of law {controller.law}: Kalman velocity, law, clipping, inverse, switch, low-pass, limits. */",
@@ -197,7 +207,7 @@ def _header(controller: Controller, prefix: str) -> str:
         "",
         "/* Indices into the array of parameters, which may be changed between two calls. */",
         *(
-            f"#define {upper}_PARAMETER_{name.upper()} {place} /* {meaning} [{unit}] */"
+            f"#define {upper}_PARAMETER_{name.upper()} {place} /* {meaning} [{_in_unit(unit, drive_unit)}] */"
             for name, (place, unit, meaning) in PARAMETERS.items()
         ),
         f"{prefix}_real *{prefix}_controller_parameters(void);",
@@ -247,6 +257,7 @@ def _literal(value: float) -> str:
 
 
 def _description(controller: Controller, prefix: str, details: dict[str, Any]) -> dict[str, Any]:
+    drive_unit = str(details.get("drive_unit", DRIVE))
     return {
         "law": controller.law,
         "prefix": prefix,
@@ -254,7 +265,12 @@ def _description(controller: Controller, prefix: str, details: dict[str, Any]) -
         "options": asdict(controller.options),
         "sample_time_s": controller.sample_time_s,
         "parameters": {
-            name: {"index": place, "value": float(controller.numbers[place]), "unit": unit, "meaning": meaning}
+            name: {
+                "index": place,
+                "value": float(controller.numbers[place]),
+                "unit": _in_unit(unit, drive_unit),
+                "meaning": meaning,
+            }
             for name, (place, unit, meaning) in PARAMETERS.items()
         },
         "measured": _places("MEASURED_"),

@@ -132,7 +132,8 @@ def findings(fit: FormFit) -> list[str]:
     levels = distinct_levels(problem.recordings)
     if levels < 4:
         count = counted(levels, "level")
-        lines.append(f"{count} of drive: as a function of the drive the yield force is {problem.base.laws[0].name}")
+        law = problem.base.laws[0].name
+        lines.append(f"the training tests have {count} of drive, so the yield force over the drive is taken as {law}")
     drive = np.linspace(0.0, problem.scales.drive, 50)
     strength = fit.model.yield_force(drive)
     if np.any(np.diff(strength) < -0.02 * np.max(np.abs(strength))):

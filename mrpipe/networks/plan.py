@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from mrpipe.artifacts import Artifact
+from mrpipe.fitting.scoring import doubt_about_fit
 from mrpipe.networks.assembly import History, read_history
 from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.evaluation import Judgement, yield_time
@@ -85,6 +86,13 @@ def sweep_grid(options: SweepOptions, past_values: int) -> Grid:
     )
 
 
+def fit_doubt(judged: Judgement, plan: TrainingPlan) -> str | None:
+    """Return why the fit of a network on the validation tests is not defined, or says little; None otherwise."""
+    if not judged.pooled.samples:
+        return "the campaign has no validation test"
+    return doubt_about_fit(judged.pooled.nrmse, judged.pooled.fit_percent, plan.spec.target)
+
+
 def training_summary(trained: Trained, judged: Judgement, plan: TrainingPlan) -> dict[str, Any]:
     """Return what `train-forward` and `train-inverse` print: architecture, errors, baseline, spread over starts."""
     network = trained.network
@@ -94,6 +102,7 @@ def training_summary(trained: Trained, judged: Judgement, plan: TrainingPlan) ->
         "training_nrmse": judged.training.nrmse,
         "validation_nrmse": judged.pooled.nrmse,
         "validation_fit_percent": judged.pooled.fit_percent,
+        "validation_fit_doubt": fit_doubt(judged, plan),
         "parameters": network.parameters,
         "iterations": trained.iterations,
         "seconds": trained.seconds,

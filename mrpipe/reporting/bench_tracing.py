@@ -109,8 +109,13 @@ def residual_maps(
     return figure
 
 
-def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: float, least_share: float) -> Figure:
-    """Draw the share of the recoverable residual that each family recovers, best at the top."""
+def candidate_ranking(
+    candidates: Sequence[Mapping[str, Any]],
+    named_share: float,
+    least_share: float,
+    quantity: str = "share of the recoverable residual [1]",
+) -> Figure:
+    """Draw the share of the recoverable residual that each family recovers, best at the top; `quantity` is its name."""
     figure, axes = figure_with_axes(1, 1, height=0.34 * max(len(candidates), 3) + 0.9)
     axis = axes[0, 0]
     place = np.arange(len(candidates))[::-1]
@@ -130,7 +135,7 @@ def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: floa
     axis.set_xlim(0, 1.02)
     axis.grid(axis="y", visible=False)
     axis.legend(fontsize=7, loc="lower right")
-    label(axis, "share of the recoverable residual [1]", "")
+    label(axis, quantity, "")
     return figure
 
 

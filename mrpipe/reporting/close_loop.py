@@ -24,6 +24,7 @@ from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
 from mrpipe.reporting.headlines import open_questions
 from mrpipe.reporting.sink import Sink
+from mrpipe.reporting.traced_words import shares_in_words, shown_candidates
 from mrpipe.tracing.bench.verdict.summary import Tracing
 
 
@@ -137,15 +138,14 @@ def _drive_map(states: Mapping[str, FloatArray], drive: str, unit: str) -> tuple
 
 
 def _candidates(sink: Sink, summary: Mapping[str, Any], named_share: float, least_share: float) -> None:
-
-    candidates = summary["candidates"]
+    candidates, of_what = shown_candidates(summary), shares_in_words(summary)
     if not candidates:
         return
     sink.figure(
         "ranking",
-        candidate_ranking(candidates, named_share, least_share),
-        "Share that each family of effects recovers if it is added alone and all parameters are fitted again; NRMSE "
-        "on the validation tests. A family whose strength is at a bound is not named.",
+        candidate_ranking(candidates, named_share, least_share, f"share {of_what} [1]"),
+        f"Share {of_what} that each family of effects recovers if it is added alone and all parameters are fitted "
+        "again; NRMSE on the validation tests. A family whose strength is at a bound is not named.",
     )
     rows = [
         {

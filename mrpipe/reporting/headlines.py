@@ -34,6 +34,10 @@ def _number(value: Any, factor: float = 1.0, digits: int = 3) -> str:
     return "-" if value is None else f"{value * factor:.{digits}g}"
 
 
+def _fit(percent: float | None) -> str:
+    return "not defined" if percent is None else f"{_number(percent)} %"
+
+
 def _prepared(summary: Mapping[str, Any]) -> str:
     return (
         f"campaign {summary.get('campaign', '')}: {counted(int(summary.get('test_count') or 0), 'test')} at "
@@ -55,7 +59,7 @@ def _sweep(summary: Mapping[str, Any]) -> str:
 def _training(summary: Mapping[str, Any]) -> str:
     return (
         f"{summary.get('architecture', '')}: validation NRMSE {_number(summary.get('validation_nrmse'))}, "
-        f"fit {_number(summary.get('validation_fit_percent'))} %"
+        f"fit {_fit(summary.get('validation_fit_percent'))}"
     )
 
 
@@ -75,7 +79,7 @@ def _damper(summary: Mapping[str, Any]) -> str:
     form = summary.get("form") or summary.get("model", "")
     return (
         f"{form}: validation NRMSE {_number(summary.get('validation_nrmse'))}, "
-        f"fit {_number(summary.get('validation_fit_percent'))} %"
+        f"fit {_fit(summary.get('validation_fit_percent'))}"
     )
 
 

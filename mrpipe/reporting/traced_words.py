@@ -51,6 +51,27 @@ def exchanged_form(summary: Mapping[str, Any]) -> str:
     return "" if taken == found.get("declared") else taken
 
 
+def shown_candidates(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the candidates, best first, with the share that each effect recovers by itself.
+
+    Where the final model has another base form, `share` of a candidate counts what this form recovers too, so that all
+    of them come near to 1. The share of its best form, which is that of the effect on the final base form, is shown
+    instead.
+    """
+    rows = [dict(item) for item in summary.get("candidates") or []]
+    if not exchanged_form(summary):
+        return rows
+    for row in rows:
+        row["share"] = max((row.get("forms") or {}).values(), default=row.get("share"))
+    return sorted(rows, key=lambda row: -float(row["share"] or 0.0))
+
+
+def shares_in_words(summary: Mapping[str, Any]) -> str:
+    """Return what the shares of the candidates are shares of."""
+    taken = exchanged_form(summary)
+    return f"of what the base form {taken} leaves above the noise" if taken else "of the recoverable residual"
+
+
 def exchange_in_words(summary: Mapping[str, Any]) -> str:
     """Return a sentence on another base form than the declared one, if the final model has one."""
     taken = exchanged_form(summary)

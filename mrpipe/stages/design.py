@@ -55,7 +55,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     for law, why in result.left_out.items():
         context.warn(f"law {law} is not in the race, because {why}")
-    summary = design_as_json(result, settings)
+    summary = {**design_as_json(result, settings), "drive_unit": rig.damper.drive_unit}
     with context.write("design.h5") as artifact:
         write_design(artifact, result, summary)
     report.describe(context.report, result, summary)

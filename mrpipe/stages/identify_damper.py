@@ -37,9 +37,20 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
         "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
     }
+    if summary["validation_fit_doubt"]:
+        context.warn(summary["validation_fit_doubt"])
     _write(context, comparison, chosen, summary, largest)
     section.describe(context.report, section.IdentifiedDamper(tests, comparison.judged, chosen, summary))
     return summary
+
+
+def _fit_doubt(chosen: JudgedFit) -> str | None:
+    """Return why the fit on the validation tests is not defined, or says little; None otherwise."""
+    from mrpipe.fitting.scoring import doubt_about_fit
+
+    if not any(test.role == "validation" for test in chosen.tests):
+        return "the campaign has no validation test"
+    return doubt_about_fit(chosen.validation.nrmse, chosen.validation.fit_percent, "force")
 
 
 def _summary(comparison: Comparison, chosen: JudgedFit, reference: float, without_drive: bool) -> dict[str, Any]:
@@ -70,6 +81,7 @@ def _summary(comparison: Comparison, chosen: JudgedFit, reference: float, withou
         "validation_nrmse": number_or_none(chosen.validation.nrmse),
         "validation_fit_percent": number_or_none(chosen.validation.fit_percent),
         "validation_r2": number_or_none(chosen.validation.r2),
+        "validation_fit_doubt": _fit_doubt(chosen),
         "comparison": comparison_rows(comparison.judged),
         "ranking": rank_rows(comparison),
         "correlated": correlation_rows(chosen.fit),

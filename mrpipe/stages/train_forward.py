@@ -11,7 +11,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.networks.evaluation import judge, judge_free_run
     from mrpipe.networks.network import write_network
-    from mrpipe.networks.plan import training_plan, training_summary
+    from mrpipe.networks.plan import fit_doubt, training_plan, training_summary
     from mrpipe.networks.training import train
     from mrpipe.reporting import train_forward as section
 
@@ -32,8 +32,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         artifact.put_json("held_out", list(trained.held_out))
         artifact.put("path", trained.path, unit="1", dims=("iteration",), description="training NRMSE")
     free = judge_free_run(trained.network, plan.validation)
-    if judged.finding:
-        context.warn(judged.finding)
+    for finding in (judged.finding, fit_doubt(judged, plan)):
+        if finding:
+            context.warn(finding)
     section.describe(context.report, section.TrainedForward(trained, judged, plan.validation, free))
     summary = training_summary(trained, judged, plan)
     if free is not None:

@@ -17,7 +17,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.networks.assembly import drive_range
     from mrpipe.networks.evaluation import judge
     from mrpipe.networks.network import read_network, write_network
-    from mrpipe.networks.plan import training_plan, training_summary
+    from mrpipe.networks.plan import fit_doubt, training_plan, training_summary
     from mrpipe.networks.tracking import judge_tracking
     from mrpipe.networks.training import train
     from mrpipe.reporting import train_inverse as section
@@ -54,7 +54,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         tracking = judge_tracking(
             trained.network, forward, training, validation, settings.viscous, judged.yield_travel_m
         )
-    for finding in (judged.finding, tracking.finding if tracking else ""):
+    for finding in (judged.finding, fit_doubt(judged, plan), tracking.finding if tracking else ""):
         if finding:
             context.warn(finding)
     compared = signed["signed"] if signed else None

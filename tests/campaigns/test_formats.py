@@ -178,6 +178,45 @@ def test_xlsx_with_a_title_and_a_second_sheet(tmp_path: Path) -> None:
     _require(tmp_path / "a.xlsx", "Weg [mm]", "Kraft (kN)")
 
 
+@pytest.mark.oracle
+def test_each_sheet_of_a_workbook_with_a_record_can_be_named(tmp_path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(["only notes"])
+    for title, count in (("short", 150), ("long", 200)):
+        sheet = book.create_sheet(title)
+        sheet.append(["Zeit [s]", "Weg [mm]", "Kraft (kN)"])
+        for row in list(zip(TIME, TRAVEL * (1.0 if title == "long" else 2.0), FORCE, strict=True))[:count]:
+            sheet.append([float(item) for item in row])
+    book.save(tmp_path / "a.xlsx")
+    file = open_data_file(tmp_path / "a.xlsx")
+    assert "short!Weg [mm]" in file.names and file.separator == "!"
+    np.testing.assert_allclose(file.column("short!Weg [mm]", "test"), 2.0 * TRAVEL[:150])
+    # a plain name and a position are those of the sheet with the most rows
+    for column in ("Weg [mm]", "long!Weg [mm]", 1):
+        np.testing.assert_allclose(file.column(column, "test"), TRAVEL)
+
+
+@pytest.mark.golden
+def test_units_and_empty_lines_of_a_labview_file(tmp_path: Path) -> None:
+    rows = [",".join(f"{value:.6f}" for value in row) for row in np.column_stack([TIME, TRAVEL, FORCE])]
+    text = [
+        *("LabVIEW Measurement,", "Separator,Comma", "X_Columns,One", "***End_of_Header***,", ",,,".replace(",", "\t")),
+        *(
+            "Channels,2,,",
+            "Y_Unit_Label,mm,kN",
+            "Delta_X,0.01,0.01",
+            "***End_of_Header***,,",
+            "X_Value,Weg,Kraft,Comment",
+        ),
+    ]
+    (tmp_path / "a.lvm").write_text("\n".join([*text, *rows]) + "\n", encoding="utf-8")
+    file = open_data_file(tmp_path / "a.lvm")
+    assert file.units == {"Weg": "mm", "Kraft": "kN"}
+    np.testing.assert_allclose(file.column("Kraft", "test"), FORCE, atol=1e-5)
+
+
 @pytest.mark.golden
 @pytest.mark.parametrize(
     ("ending", "module", "extra"),

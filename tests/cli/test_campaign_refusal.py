@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from mrpipe.cli import run
+from mrpipe.cli.options import CommonOptions
+from mrpipe.cli.session import session
+from mrpipe.cli.stage_commands import _without_constant_drive
 from tests.campaigns.plausibility.rig import sound_tests
 
 from .test_check import project
@@ -97,3 +100,12 @@ def test_files_of_others_and_results_stay(tmp_path: Path) -> None:
     assert (run_directory / "prepared.h5").is_file()
     assert run([*good, str(there)]) == 2
     assert there.is_dir()
+
+
+def test_an_export_of_everything_leaves_out_what_needs_an_inverse_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path, _with_one_drive())
+    with session(CommonOptions(config=config, run=tmp_path / "run", quiet=True)) as pipeline:
+        assert _without_constant_drive(pipeline, ["export-damper", "export-inverse"]) == ["export-damper"]
+    assert "export-inverse is left out: the drive never changes" in capsys.readouterr().err

@@ -355,3 +355,27 @@ def test_a_campaign_on_the_command_line_is_what_was_checked(tmp_path: Path, caps
     status, out, _ = checked(capsys, "--campaign", campaign)
     assert status == 0 and out.startswith(f"campaign {campaign}: valid")
     assert f"next: mrpipe run --campaign '{campaign}'" in out
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(
+    ("channel", "expected"),
+    [
+        ({"input_force": {"column": "g", "unit": "N"}}, "does not say on which floor the shaker acts"),
+        ({"input_force": {"column": "g", "unit": "N", "floor": 5}}, "is 5; the frame has floors 1 to 2"),
+        ({}, "no ground_acceleration"),
+    ],
+)
+def test_what_the_identification_of_a_frame_refuses_is_an_error_of_check_and_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], channel: dict[str, Any], expected: str
+) -> None:
+    config = tower(tmp_path)
+    file = tmp_path / "data" / "campaign.yaml"
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    column = content["channels"].pop("ground_acceleration")["column"]
+    content["channels"] |= {name: {**entry, "column": column} for name, entry in channel.items()}
+    file.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    status, out, _ = checked(capsys, str(config))
+    assert status == 1 and expected in out
+    assert run(["run", str(config), "--run", str(tmp_path / "run"), "--quiet"]) == 2
+    assert expected in capsys.readouterr().err and not (tmp_path / "run").exists()

@@ -11,6 +11,8 @@ import pytest
 
 from mrpipe.cli import run
 
+from .test_check import project
+
 pytestmark = pytest.mark.property
 
 COMMANDS = [
@@ -151,3 +153,22 @@ def test_status_imports_no_compiler_and_no_numerics(tmp_path: Path) -> None:
     heavy = {"numba", "scipy", "sklearn", "pandas", "matplotlib", "pint", "jinja2", "joblib"}
     assert heavy & set(eval_list(done.stderr)) == set()
     assert "prepare" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "default"),
+    [("prepare", "or of the campaign of --campaign"), ("record", "name of the configuration."), ("demo", "runs/demo")],
+)
+def test_the_help_of_run_names_no_option_that_the_command_lacks(
+    command: str, default: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([command, "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert default in text and ("--campaign" in text) == (command == "prepare")
+
+
+def test_check_and_report_take_the_options_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = str(project(tmp_path))
+    assert run(["check", config, "--run", str(tmp_path / "run"), "--seed", "3", "--quiet"]) == 0
+    assert run(["report", "--campaign", str(tmp_path / "data"), "--run", str(tmp_path / "run")]) == 2
+    assert "no such run directory" in capsys.readouterr().err

@@ -117,3 +117,16 @@ def test_missing_samples_of_a_data_file_are_counted(tmp_path: Path, capsys: pyte
     lines = shown(capsys, str(path))
     assert any("missing samples" in line for line in lines)
     assert next(line for line in lines if "x [mm]" in line).split()[-1] == "2"
+
+
+@pytest.mark.golden
+def test_an_unknown_declared_effect_is_a_warning_with_the_valid_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project(tmp_path, declared_effects=["backlsh", "heating"])
+    (line,) = [line for line in shown(capsys, str(tmp_path / "data")) if line.startswith("warning: ")]
+    assert "declared_effects[0]: 'backlsh' is not an effect" in line and "did you mean backlash?" in line
+    assert "remanence" in line and "joint-friction" not in line
+    assert run(["show", str(tmp_path / "data"), "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["plausibility"]
+    assert (found["name"], found["severity"]) == ("effect-unknown", "warning")

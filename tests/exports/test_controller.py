@@ -144,6 +144,15 @@ def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
 
 
 @pytest.mark.golden
+def test_the_drive_has_the_unit_of_the_damper(set_c):
+    controller = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse_table(set_c))
+    files = controller_files(controller, "rig", {"drive_unit": "V"})
+    parameters = json.loads(files["controller.json"])["parameters"]
+    assert parameters["drive_limit"]["unit"] == "V" and parameters["k_n_m"]["unit"] == "N/m"
+    assert "largest drive [V]" in files["controller.h"] and "[drive]" not in "".join(files.values())
+
+
+@pytest.mark.golden
 def test_description_is_json_with_all_numbers(set_c):
     controller = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse_table(set_c))
     files = controller_files(controller, "rig", {"drive_unit": "A"})

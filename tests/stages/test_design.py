@@ -59,7 +59,9 @@ def test_the_gains_of_a_design_are_simulated_and_exported(
         return json.loads(shown.out)  # type: ignore[no-any-return]
 
     calibrated = result_of("simulate", "--law", "fdns")
-    designed = result_of("design", "--damper", "set-c")["laws"]["fdns"]
+    document = result_of("design", "--damper", "set-c")
+    assert document["drive_unit"] == "A"  # of the keys rms_drive
+    designed = document["laws"]["fdns"]
     gains = designed["gains"]
     assert gains["alpha_n_m"] != pytest.approx(designed["calibrated"]["gains"]["alpha_n_m"], rel=1e-3)
     # the largest response over frequency is no smaller than that at any one frequency

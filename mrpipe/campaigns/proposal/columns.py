@@ -13,7 +13,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.plausibility.reference import mean_frequency
 from mrpipe.campaigns.proposal.samples import has_few_levels, motion_and_force
-from mrpipe.campaigns.proposal.words import Header, read_header, read_path
+from mrpipe.campaigns.proposal.words import Header, read_header, read_path, split_words
 from mrpipe.errors import UserError
 from mrpipe.words import counted, listed
 
@@ -94,6 +94,8 @@ def columns_of(file: DataFile) -> list[Column]:
 
 def separator_of(file: DataFile) -> str:
     """Return the sign between a group and a channel in the names of a file's columns, empty where it has no groups."""
+    if file.separator:
+        return file.separator
     paths = [name for name in file.names if "/" in name]
     return "/" if paths else "" if file.table else "."
 
@@ -144,9 +146,9 @@ def lay_out_bench(columns: list[Column], file: DataFile) -> Layout:
         column = _by_header(left, channel, taken)
         if column is not None:
             take(channel, column, _guess(column, channel))
-    drive = _by_header(left, "current", taken) or _by_header(left, "voltage", taken)
+    drive = _by_header(left, "current", taken) or _by_header(left, "voltage", taken) or _called_u(left, taken)
     if drive is not None:
-        quantity = drive.header.unit_quantity or drive.header.quantity
+        quantity = drive.header.unit_quantity or ("voltage" if _is_u(drive) else drive.header.quantity)
         unit = drive.header.unit or ("V" if quantity == "voltage" else _drive_unit(drive.values))
         unsure = "" if drive.header.unit else _DRIVE_GUESSED
         size = None if drive.header.unit or quantity == "voltage" else float(np.nanmax(np.abs(drive.values)))
@@ -257,8 +259,18 @@ def _number_floors(channels: dict[str, Guess], taken: set[str], floors: list[Col
 def _by_header(columns: list[Column], quantity: str, taken: set[str]) -> Column | None:
     """Return the best column whose header names a quantity: with a fitting unit first, measured before commanded."""
     found = [item for item in columns if item.name not in taken and _says(item, quantity)]
-    found.sort(key=lambda item: (item.header.command, item.header.unit_quantity != quantity))
+    found.sort(key=lambda item: (item.header.command, item.header.unit_quantity != quantity, _is_u(item)))
     return found[0] if found else None
+
+
+def _is_u(column: Column) -> bool:
+    """Whether the header is the letter u without a unit, the symbol of a displacement and of a voltage."""
+    return not column.header.unit and split_words(column.name)[-1:] == ["u"]
+
+
+def _called_u(columns: list[Column], taken: set[str]) -> Column | None:
+    """Return the column u that is left where another one is the displacement: it is the voltage of the drive."""
+    return next((item for item in columns if item.name not in taken and _is_u(item)), None)
 
 
 def _clock(columns: list[Column]) -> Column | None:

@@ -35,7 +35,7 @@ WORDS: dict[str, tuple[str, ...]] = {
         *("i", "current", "strom", "courant", "corriente", "corrente", "prad", "amps", "ampere", "coil", "spulenstrom"),
         *("amp",),
     ),
-    "voltage": ("voltage", "volt", "volts", "spannung", "tension", "voltaje", "tensao", "tensione", "napiecie"),
+    "voltage": ("voltage", "volt", "volts", "spannung", "tension", "voltaje", "tensao", "tensione", "napiecie", "u"),
 }
 """Quantity -> words that name it; longer words also count as beginnings of words."""
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +16,8 @@ from mrpipe.errors import UserError
 
 FIRST_WORDS = "LabVIEW Measurement"
 
+_BLANK = re.compile(r"^[ \t]+$", re.MULTILINE)
+
 
 def read_lvm(path: Path, text: str) -> DataFile:
     """Return the channels of all segments of a LabVIEW measurement file, one after the other.
@@ -20,7 +25,8 @@ def read_lvm(path: Path, text: str) -> DataFile:
     The text is handed to the library, because reading by name would also load a pickle in the same folder.
     """
     lvm_read = optional("lvm_read", "lvm-read", "labview", path)
-    content = lvm_read.read_str(text)
+    # a spreadsheet saves the empty line before a segment with a tab for each column, which the library does not take
+    content = lvm_read.read_str(_BLANK.sub("", text))
     segments = [content[index] for index in range(content["Segments"])]
     names = [str(name).strip() for name in segments[0]["Channel names"]]
     if any([str(name).strip() for name in item["Channel names"]] != names for item in segments):
@@ -39,7 +45,16 @@ def read_lvm(path: Path, text: str) -> DataFile:
         table=True,
         time_s=clock,
         sampling_rate_hz=None if clock is None else constant_rate(clock),
+        units=_units(names, segments[0]),
     )
+
+
+def _units(names: Sequence[str], segment: Mapping[str, Any]) -> dict[str, str]:
+    """Return channel -> unit that the header of a segment states, where one time column stands before the channels."""
+    if names[:1] != ["X_Value"] or names.count("X_Value") > 1:
+        return {}
+    stated = [str(item).strip() for item in segment.get("Y_Unit_Label", [])]
+    return {name: unit for name, unit in zip(names[1:], stated, strict=False) if unit and name != "Comment"}
 
 
 def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:

@@ -10,7 +10,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.modal.decays.decay import DecayMethod, DecayResult, Estimate, analyse_decay
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests, Place
-from mrpipe.words import noun
+from mrpipe.words import listed, noun
 
 _NORMAL_95 = 1.959964
 LONGER_RECORDS = "; longer records, or more force on this mode, would reduce this interval"
@@ -117,5 +117,6 @@ def choose_damping(
     without = [str(mode) for mode in range(1, len(sweep) + 1) if mode not in decays]
     if without and decays and damping_from == "decay":
         tests = "forced tests" if other == "sweep" else f"{other} tests"
-        findings.append(f"no free decay of {noun(len(without), 'mode')} {', '.join(without)}: damping from the {tests}")
+        whose = f"{noun(len(without), 'mode')} {listed(without)}, so {'its' if len(without) == 1 else 'their'} damping"
+        findings.append(f"there is no free decay of {whose} comes from the {tests}")
     return tuple(chosen), tuple(sources), findings

@@ -158,8 +158,8 @@ def residual_over(
     return figure
 
 
-def candidate_shares(candidates: Sequence[Mapping[str, Any]], named: Sequence[str]) -> Figure:
-    """Draw which share of the recoverable residual each family of effects recovers alone; named ones are blue."""
+def candidate_shares(candidates: Sequence[Mapping[str, Any]], named: Sequence[str], of_what: str) -> Figure:
+    """Draw which share (`of_what` in words) each family of effects recovers alone; named ones are blue."""
     shown = candidates[:10]
     figure, axes = figure_with_axes(1, 1, width=5.6, height=0.3 * max(len(shown), 2) + 0.75)
     axis = axes[0, 0]
@@ -171,7 +171,7 @@ def candidate_shares(candidates: Sequence[Mapping[str, Any]], named: Sequence[st
     axis.set_yticks(place, [item["name"] for item in shown], fontsize=9)
     axis.set_xlim(0.0, 112.0)
     axis.grid(axis="y", visible=False)
-    label(axis, "share of the recoverable residual [%]", "")
+    label(axis, f"share {of_what} [%]", "")
     return figure
 
 

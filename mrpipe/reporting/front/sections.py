@@ -18,7 +18,7 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
-from mrpipe.reporting.traced_words import exchange_in_words, unproven_in_words
+from mrpipe.reporting.traced_words import exchange_in_words, shares_in_words, shown_candidates, unproven_in_words
 from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed
@@ -165,8 +165,8 @@ def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
     if loop.get("candidates"):
         section.figure(
             "candidates",
-            figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
-            "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
+            figures.candidate_shares(shown_candidates(loop), [item["name"] for item in effects], shares_in_words(loop)),
+            f"Share {shares_in_words(loop)} that each effect recovers alone; named effects in blue.",
         )
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from mrpipe.dampers.model import DamperModel
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
-from mrpipe.reporting.traced_words import determined, exchanged_form, leading_first
+from mrpipe.reporting.traced_words import determined, exchanged_form, leading_first, shares_in_words, shown_candidates
 from mrpipe.reporting.words import number, plain, quantity, readable_unit
 
 _COLUMNS = {
@@ -36,10 +36,10 @@ def rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
             {
                 "effect": item["name"],
                 "form": item.get("form", ""),
-                "recovers [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
+                f"recovers {shares_in_words(loop)} [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
                 "error then [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
             }
-            for item in loop.get("candidates", [])[:8]
+            for item in shown_candidates(loop)[:8]
         ]
     )
 

@@ -48,6 +48,16 @@ def test_checks_are_found_and_named_once() -> None:
 
 
 @pytest.mark.planted
+@pytest.mark.parametrize(("largest", "found"), [(12.0, None), (4e3, "warning"), (9e4, "error")])
+def test_kilovolts_drive_an_electrorheological_damper_and_no_coil(largest: float, found: str | None) -> None:
+    campaign = replace(_bench(_scaled("drive", largest / 1.5)), drive_unit="V")
+    drive = [item for item in judge(campaign) if item.channel == "drive"]
+    assert [item.severity for item in drive] == ([found] if found else [])
+    if found == "warning":
+        assert "electrorheological" in drive[0].sentence and "mV" in drive[0].remedy
+
+
+@pytest.mark.planted
 def test_a_current_that_is_noise_alone_is_zero_and_not_negative() -> None:
     rng = np.random.default_rng(1)
 

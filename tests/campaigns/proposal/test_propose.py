@@ -39,6 +39,8 @@ HEADERS = [
     ("Accélération_m/s^2", "acceleration", "m/s^2"),
     ("Spulenstrom in mA", "current", "mA"),
     ("Tensione [V]", "voltage", "V"),
+    ("U [V]", "voltage", "V"),
+    ("u (mm)", "displacement", "mm"),
     ("Temps (s)", "time", "s"),
     ("Time, rel (ms)", "time", "ms"),
     ("F_N", "force", "N"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.reporting.front.tables import effects, wanted_tests
+from mrpipe.reporting.front.tables import effects, rivals, wanted_tests
 from mrpipe.reporting.traced_words import determined
 
 pytestmark = pytest.mark.property
@@ -44,3 +44,21 @@ def test_tests_to_be_made_are_in_practical_units() -> None:
     )
     assert list(frame.columns) == ["test", "amplitude [mm]", "drive", "rounds"]
     assert frame["amplitude [mm]"].tolist() == ["8.30", "-"]
+
+
+@pytest.mark.parametrize("taken", ["bouc-wen", "dahl-stiffness"])
+def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: str) -> None:
+    loop = {
+        "base_form": {"declared": "bouc-wen", "taken": taken},
+        "candidates": [
+            {"name": "stribeck", "share": 0.998, "nrmse": 0.049, "forms": {"gaussian": 0.02, "rational": 0.1}},
+            {"name": "accumulator", "share": 0.997, "nrmse": 0.008, "forms": {"linear": 0.95}},
+        ],
+    }
+    table = rivals(loop)
+    if taken == "bouc-wen":
+        assert table["recovers of the recoverable residual [%]"].tolist() == ["99.8", "99.7"]
+    else:
+        heading = "recovers of what the base form dahl-stiffness leaves above the noise [%]"
+        assert table["effect"].tolist() == ["accumulator", "stribeck"]
+        assert table[heading].tolist() == ["95.0", "10.0"]

@@ -24,7 +24,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "acceleration": (1e-4, 1000.0),
         "force": (1.5, 1e7),
         "A": (0.005, 30.0),
-        "V": (0.005, 500.0),
+        "V": (0.005, 20e3),
     },
     "shear-frame": {
         "displacement": (1e-7, 5.0),
@@ -32,10 +32,14 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "acceleration": (1e-6, 300.0),
         "force": (1e-3, 1e8),
         "A": (0.005, 30.0),
-        "V": (0.005, 500.0),
+        "V": (0.005, 20e3),
     },
 }
 """Rig -> quantity -> smallest and largest plausible amplitude over all tests (half the range of a channel, SI)."""
+
+COIL_VOLTAGE = 500.0
+"""Drive [V] above which no damper with a coil is driven; electrorheological dampers take up to 20 kV (5 kV over each
+millimetre of a gap, the strength of the fluid), so a drive above it may be right, or millivolts given as volts."""
 
 STIFFNESS = (50.0, 1e9)
 """Plausible ratios of the largest force to the largest displacement of a bench campaign [N/m]."""
@@ -76,6 +80,8 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
         if finding is not None:
             found = True
             yield finding
+        elif key == "V" and max(entries)[0] > COIL_VOLTAGE:
+            yield _of_no_coil(channel, *max(entries))
     if campaign.rig == "damper-bench" and not found:
         yield from _together(campaign, sizes)
 
@@ -98,6 +104,19 @@ def _outside(channel: str, entries: list[tuple[float, str]], limits: tuple[float
         f"{several}",
         remedy=f"correct the unit of {channel} in campaign.yaml (a factor of 1000 is the usual mistake)",
         numbers={"amplitude_si": largest, "smallest_si": low, "largest_si": high},
+    )
+
+
+def _of_no_coil(channel: str, largest: float, test: str) -> Finding:
+    """Return the warning that a drive has the voltage of an electrorheological damper, or that its unit is wrong."""
+    return Finding(
+        name="high-voltage",
+        severity="warning",
+        channel=channel,
+        sentence=f"the drive reaches {largest:.4g} V (test {test}): an electrorheological damper is driven with "
+        f"kilovolts, the coil of a magnetorheological damper with less than {COIL_VOLTAGE:g} V",
+        remedy="if this damper has a coil, correct the unit of the drive in campaign.yaml (mV given as V?)",
+        numbers={"amplitude_v": largest},
     )
 
 
