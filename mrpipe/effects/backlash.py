@@ -10,11 +10,12 @@ from mrpipe.dampers.hysteresis import displacement_between, turning_share
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
-CORNER = 1.0 / 16.0
-"""Numerical technique: share of a step over which the damper takes up the speed of the rod after the flanks have met.
-Without it, the force at a sample would jump while the gap changes, and least squares would find no slope."""
+WINDOW = 0.5
+"""Numerical technique: length in steps, centred at the sample, over which the damper takes up the speed of the rod
+where the flanks meet. Without it, the force at a sample would jump while the gap changes, and least squares would find
+no slope."""
 
-FINE_CORNER = 1.0 / 64.0
+NARROW_WINDOW = 0.125
 """The same for graded plays, whose search begins at the gap that another form has found."""
 
 
@@ -30,21 +31,26 @@ def _last_turn(before: float, speed_before: float, x: float, v: float, dt: float
 
 
 @njit(float64(float64, float64, float64), cache=True)
-def _engaged(moved: float, rod: float, corner: float) -> float:
-    """Return the share of the speed of the rod with which the damper moves at the end of a step, 0 to 1.
+def _engaged(past: float, apart: float, reach: float) -> float:
+    """Return the share of the speed of the rod with which the damper moves at a sample, 0 to 1.
 
-    The force belongs to the end of the step, where the flanks are in contact if the damper has moved at all; the rise
-    from 0 to 1 is rounded.
+    The force belongs to the instant of the sample: the damper has the speed of the rod if the flanks have met before.
+    The rise from 0 to 1 is linear, see :data:`WINDOW`.
 
     Parameters
     ----------
-    moved, rod
-        Distances that damper and rod moved since the last turning point of the rod [m].
-    corner
-        Rounding, see :data:`CORNER` [1].
+    past
+        Distance of the rod beyond the place where the flanks meet [m], negative within the gap.
+    apart
+        Distance from the last turning point of the rod, or from its last place, to that place [m]. The rise is not
+        longer, so that a gap of zero leaves the velocity unchanged.
+    reach
+        Half of the window [m].
     """
-    # without a motion the velocity is unchanged
-    return (1.0 + corner) * moved / (moved + corner * rod) if rod != 0.0 else 1.0
+    half = min(reach, apart)
+    if half <= 0.0:
+        return 1.0 if past >= 0.0 else 0.0
+    return min(max(0.5 + 0.5 * past / half, 0.0), 1.0)
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -63,6 +69,7 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         state[5] = v
         return
     turn = _last_turn(state[4], state[5], x, v, dt)
+    sign, reach = (1.0 if v > 0.0 else -1.0), 0.5 * WINDOW * abs(v) * dt
     count = 3 if kind == 1.0 else 1
     moved, engaged = 0.0, 0.0
     for index in range(count):
@@ -71,7 +78,9 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / count
-        engaged += _engaged(state[index] - at_turn, x - turn, CORNER) / count
+        # the flanks meet where the rod is half a gap ahead of the play
+        apart = half + sign * (at_turn - turn)
+        engaged += _engaged(sign * (x - turn) - apart, apart, reach) / count
     state[3] += moved + share * (x - state[4] - moved)
     state[4] = x
     state[5] = v
@@ -97,6 +106,7 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
         state[_PLAYS + 2] = v
         return
     turn = _last_turn(state[_PLAYS + 1], state[_PLAYS + 2], x, v, dt)
+    sign, reach = (1.0 if v > 0.0 else -1.0), 0.5 * NARROW_WINDOW * abs(v) * dt
     moved, engaged = 0.0, 0.0
     for index in range(_PLAYS):
         half = 0.5 * gap * (1.0 + spread * ((2.0 * index + 1.0) / _PLAYS - 1.0))
@@ -104,7 +114,9 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / _PLAYS
-        engaged += _engaged(state[index] - at_turn, x - turn, FINE_CORNER) / _PLAYS
+        # the flanks meet where the rod is half a gap ahead of the play
+        apart = half + sign * (at_turn - turn)
+        engaged += _engaged(sign * (x - turn) - apart, apart, reach) / _PLAYS
     state[_PLAYS + 1] = x
     state[_PLAYS + 2] = v
     state[_PLAYS] += moved
@@ -129,9 +141,9 @@ def lost_motion_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
     wire[VELOCITY] = max(moved, 0.0) if v > 0.0 else min(moved, 0.0)
 
 
-@njit(float64(float64[::1], float64, float64, float64), cache=True)
-def _across_free_gap(state: FloatArray, half: float, rod: float, force: float) -> float:
-    """Move the rod without a reversal, and return the distance [m] that the damper moves on the last flank.
+@njit(float64(float64[::1], float64, float64, float64, float64), cache=True)
+def _across_free_gap(state: FloatArray, half: float, rod: float, force: float, reach: float) -> float:
+    """Move the rod without a reversal, and return the share of its speed that the damper has at the end.
 
     Parameters
     ----------
@@ -143,22 +155,25 @@ def _across_free_gap(state: FloatArray, half: float, rod: float, force: float) -
         Motion of the rod [m].
     force
         Force at the last sample [N].
+    reach
+        Half of the window of :func:`_engaged` [m].
     """
     left, place = rod, state[0]
     # distance that the damper can still move while its force presses on this flank
     if abs(place) >= half and force * place > 0.0 and rod * force < 0.0:
         change = state[1] - state[4]
         slope = (force - state[3]) / change if abs(change) > 1e-12 else 0.0
-        reach = abs(rod) if slope <= 0.0 else abs(force) / slope
-        carried = min(abs(rod), reach) * (1.0 if rod > 0.0 else -1.0)
+        carried_most = abs(rod) if slope <= 0.0 else abs(force) / slope
+        carried = min(abs(rod), carried_most) * (1.0 if rod > 0.0 else -1.0)
         state[1] += carried
         left -= carried
         if left == 0.0:
-            return carried
+            return 1.0
     free = min(max(place + left, -half), half) - place
     state[0] = place + free
     state[1] += left - free
-    return left - free
+    apart = half - place if left > 0.0 else half + place
+    return _engaged(abs(left) - apart, apart, reach)
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -181,16 +196,16 @@ def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         state[5] = v
         return
     damper = state[1]
-    turn = _last_turn(state[2], state[5], x, v, dt)
+    turn, reach = _last_turn(state[2], state[5], x, v, dt), 0.5 * WINDOW * abs(v) * dt
     if turn != state[2]:
-        _across_free_gap(state, half, turn - state[2], force)
-    moved = _across_free_gap(state, half, x - turn, force)
+        _across_free_gap(state, half, turn - state[2], force, reach)
+    engaged = _across_free_gap(state, half, x - turn, force, reach)
     state[2] = x
     state[3] = force
     state[4] = damper
     state[5] = v
     wire[DISPLACEMENT] = state[1]
-    wire[VELOCITY] *= _engaged(moved, x - turn, CORNER)
+    wire[VELOCITY] *= engaged
 
 
 def _free(values: Values) -> list[Step]:

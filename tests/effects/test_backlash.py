@@ -59,5 +59,11 @@ def test_the_damper_rests_in_the_gap_and_has_the_speed_of_the_rod_outside() -> N
     wires = _run("held", {"gap": GAP_M}, 250.0)
     moves = np.diff(wires[:, DISPLACEMENT]) != 0.0
     share = wires[1:, VELOCITY] / speed[1:]
-    assert np.all(share[~moves] == 0.0)
-    assert np.median(share[moves]) == pytest.approx(1.0, abs=1e-12)
+    # the rise from 0 to 1 is at most a quarter of a step before and after the meeting of the flanks
+    # and a step with a reversal begins on one flank and ends in the gap
+    met = np.flatnonzero(np.diff(moves.astype(int)))
+    rising = np.union1d(met, met + 1)
+    steady = np.setdiff1d(np.arange(len(share)), rising)
+    assert len(met) > 10
+    assert set(share[steady]) <= {0.0, 1.0}
+    np.testing.assert_array_equal(share[steady] == 1.0, moves[steady])
