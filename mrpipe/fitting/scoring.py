@@ -12,9 +12,6 @@ from mrpipe.dampers.model import DamperModel
 from mrpipe.fitting.samples import settled
 from mrpipe.signals.prepared import PreparedTest
 
-HARDLY = 0.02
-"""Changes of a signal over its RMS value up to which it counts as constant with the noise of a sensor."""
-
 
 @dataclass(frozen=True)
 class TestScore:
@@ -92,31 +89,6 @@ def pool(scores: Sequence[TestScore]) -> PooledScore:
         return PooledScore(float(np.sqrt(error / force)) if force > 0.0 else nan, nan, nan)
     share = error / varied
     return PooledScore(float(np.sqrt(error / force)), float(100.0 * (1.0 - np.sqrt(share))), float(1.0 - share))
-
-
-def doubt_about_fit(nrmse: float, fit_percent: float, quantity: str) -> str | None:
-    """Return why the fit of the validation tests is not defined, or says little; None where it is meaningful.
-
-    Parameters
-    ----------
-    nrmse, fit_percent
-        Errors pooled over the validation tests; NaN where they are not defined.
-    quantity
-        What the model predicts: `force` or `drive`.
-    """
-    what = f"the fit compares the error with the changes of the {quantity}"
-    remedy = f"judge by the NRMSE, or add a validation test in which the {quantity} changes"
-    if np.isfinite(fit_percent):
-        share = nrmse / max(1.0 - fit_percent / 100.0, 1e-300)
-        if share > HARDLY:
-            return None
-        return (
-            f"the {quantity} of the validation tests changes by {100.0 * share:.2g} % of its RMS value only; {what}, "
-            f"so that it says little: {remedy}"
-        )
-    if np.isfinite(nrmse):
-        return f"the {quantity} of the validation tests is constant; {what}, so that it is not defined: {remedy}"
-    return f"no validation test has a {quantity} other than zero, so that no relative error is defined"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from mrpipe.artifacts import Artifact
-from mrpipe.fitting.scoring import doubt_about_fit
 from mrpipe.networks.assembly import History, read_history
 from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.evaluation import Judgement, yield_time
@@ -15,6 +14,7 @@ from mrpipe.networks.network import FeatureSpec, spec_from_json
 from mrpipe.networks.options import THESIS_HIDDEN, SweepOptions, TrainingOptions
 from mrpipe.networks.scaling import Normalisation
 from mrpipe.networks.training import Trained
+from mrpipe.signals.error_size import doubt_about_fit
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 def _fit_doubt(chosen: JudgedFit) -> str | None:
     """Return why the fit on the validation tests is not defined, or says little; None otherwise."""
-    from mrpipe.fitting.scoring import doubt_about_fit
+    from mrpipe.signals.error_size import doubt_about_fit
 
     if not any(test.role == "validation" for test in chosen.tests):
         return "the campaign has no validation test"

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from mrpipe.fitting.scoring import TestScore, doubt_about_fit, pool
+from mrpipe.fitting.scoring import TestScore, pool
+from mrpipe.signals.error_size import doubt_about_fit
 
 
 def _score(forces: list[float], error: float) -> TestScore:
