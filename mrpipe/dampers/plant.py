@@ -326,19 +326,11 @@ def advance(
 
 @njit(
     void(
-        CHAIN_FUNCTIONS,
-        float64[::1],
-        int64[::1],
-        int64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-        float64,
-        float64[:, ::1],
+        CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64[::1],
+        float64, float64[:, ::1],
     ),
     cache=True,
-)
+)  # fmt: skip
 def _run(
     functions: Any,
     parameters: FloatArray,
