@@ -53,6 +53,27 @@ def _engaged(past: float, apart: float, reach: float) -> float:
     return min(max(0.5 + 0.5 * past / half, 0.0), 1.0)
 
 
+@njit(float64(float64, float64, float64, float64, float64), cache=True)
+def _engaged_play(play: float, half: float, turn: float, x: float, reach: float) -> float:
+    """Return the share of the speed of the rod with which a play moves at a sample, see :func:`_engaged`.
+
+    Parameters
+    ----------
+    play
+        Place of the play at the last turning point of the rod [m].
+    half
+        Half of its gap [m].
+    turn, x
+        Displacement of the rod at that point, or at its last place, and at the sample [m].
+    reach
+        Half of the window, with the sign of the velocity of the rod [m].
+    """
+    sign = 1.0 if reach > 0.0 else -1.0
+    # the flanks meet where the rod is half a gap ahead of the play
+    apart = half + sign * (play - turn)
+    return _engaged(sign * (x - turn) - apart, apart, abs(reach))
+
+
 @njit(STEP_SIGNATURE, cache=True)
 def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: gap [m] between the flanks, stiffness share within the gap, kind.
@@ -69,7 +90,7 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         state[5] = v
         return
     turn = _last_turn(state[4], state[5], x, v, dt)
-    sign, reach = (1.0 if v > 0.0 else -1.0), 0.5 * WINDOW * abs(v) * dt
+    reach = 0.5 * WINDOW * v * dt
     count = 3 if kind == 1.0 else 1
     moved, engaged = 0.0, 0.0
     for index in range(count):
@@ -78,9 +99,7 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / count
-        # the flanks meet where the rod is half a gap ahead of the play
-        apart = half + sign * (at_turn - turn)
-        engaged += _engaged(sign * (x - turn) - apart, apart, reach) / count
+        engaged += _engaged_play(at_turn, half, turn, x, reach) / count
     state[3] += moved + share * (x - state[4] - moved)
     state[4] = x
     state[5] = v
@@ -106,7 +125,7 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
         state[_PLAYS + 2] = v
         return
     turn = _last_turn(state[_PLAYS + 1], state[_PLAYS + 2], x, v, dt)
-    sign, reach = (1.0 if v > 0.0 else -1.0), 0.5 * NARROW_WINDOW * abs(v) * dt
+    reach = 0.5 * NARROW_WINDOW * v * dt
     moved, engaged = 0.0, 0.0
     for index in range(_PLAYS):
         half = 0.5 * gap * (1.0 + spread * ((2.0 * index + 1.0) / _PLAYS - 1.0))
@@ -114,9 +133,7 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
         at_turn = min(max(before, turn - half), turn + half)
         state[index] = min(max(at_turn, x - half), x + half)
         moved += (state[index] - before) / _PLAYS
-        # the flanks meet where the rod is half a gap ahead of the play
-        apart = half + sign * (at_turn - turn)
-        engaged += _engaged(sign * (x - turn) - apart, apart, reach) / _PLAYS
+        engaged += _engaged_play(at_turn, half, turn, x, reach) / _PLAYS
     state[_PLAYS + 1] = x
     state[_PLAYS + 2] = v
     state[_PLAYS] += moved

@@ -94,7 +94,7 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
     return {
         "controller.h": _header(controller, prefix, unit),
         "controller.c": c_text.in_either_precision(_source(controller, law, prefix), prefix),
-        "controller.json": json.dumps(_description(controller, prefix, details), indent=2) + "\n",
+        "controller.json": json.dumps(_description(controller, prefix, unit, details), indent=2) + "\n",
         "vectors.csv": vectors.as_csv(),
         "self_test.c": c_text.self_test(
             "controller.h",
@@ -256,8 +256,7 @@ def _literal(value: float) -> str:
     return float(value).hex()
 
 
-def _description(controller: Controller, prefix: str, details: dict[str, Any]) -> dict[str, Any]:
-    drive_unit = str(details.get("drive_unit", DRIVE))
+def _description(controller: Controller, prefix: str, drive_unit: str, details: dict[str, Any]) -> dict[str, Any]:
     return {
         "law": controller.law,
         "prefix": prefix,

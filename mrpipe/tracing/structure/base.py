@@ -118,17 +118,8 @@ def frame_problem(
     colour = _colour_of(few, band, lambda item: _spectra(few, masses, band, _shear(storey, turns), rules, item))
     few_spectra = _spectra(few, masses, band, _shear(storey, turns), rules, colour)
     stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
-    sheared = FrameProblem(
-        (),
-        (),
-        masses,
-        band,
-        storey,
-        frequencies,
-        rules,
-        Weighting.of_displacements(stiffness, training[0].turns),
-        colour,
-    )
+    weighting = Weighting.of_displacements(stiffness, turns)
+    sheared = FrameProblem((), (), masses, band, storey, frequencies, rules, weighting, colour)
     sheared = replace(sheared, training=sheared.spectra(training))
     found = _bending(sheared, training) if _bends(sheared) else sheared
     return replace(found, validation=found.spectra(validation))

@@ -17,7 +17,6 @@ import itertools
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem
 from mrpipe.tracing.structure.sensor_faults import SensorFault, sensors_of
 from mrpipe.tracing.structure.spectra import Spectra
@@ -66,7 +65,7 @@ def shape_of_lowest_mode(record: Spectra) -> FloatArray:
     return np.asarray(shape / shape[int(np.argmax(np.abs(shape)))])
 
 
-def grows(shape: FloatArray, tolerance: float = FrameRules().same_gain) -> bool:
+def grows(shape: FloatArray, tolerance: float) -> bool:
     """Return whether the displacement of a mode shape grows from floor to floor.
 
     Parameters
