@@ -9,7 +9,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+    from mrpipe.control.controller import Controller, build_controller
+    from mrpipe.control.controller_options import ControllerOptions
     from mrpipe.control.gains import Gains
     from mrpipe.control.inverse import InverseTable, inverse_table
     from mrpipe.control.kernel import COMMAND_SIZE, controller_step
@@ -27,7 +28,7 @@ __all__ = [
 
 _HOMES = {
     "Controller": "controller",
-    "ControllerOptions": "controller",
+    "ControllerOptions": "controller_options",
     "build_controller": "controller",
     "Gains": "gains",
     "InverseTable": "inverse",

@@ -17,7 +17,8 @@ from scipy.optimize import brentq
 
 from mrpipe.artifacts import Artifact
 from mrpipe.control.calibration import Calibration
-from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.controller import Controller, build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import InverseTable, inverse_table
 from mrpipe.control.law import Law

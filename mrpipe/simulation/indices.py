@@ -47,15 +47,12 @@ class Decay:
         Damping ratio from each extremum to the next, shape (p - 1,).
     peak_time_s, peak_m
         Extrema, shape (p,).
-    with_current
-        Whether current flowed in the half period before each extremum, shape (p,).
     """
 
     mean: float
     point_to_point: FloatArray
     peak_time_s: FloatArray
     peak_m: FloatArray
-    with_current: BoolArray
 
 
 def decay_damping(response: Response, start_s: float, drive_threshold: float) -> Decay:
@@ -89,7 +86,7 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     peaks = np.array(keep, dtype=np.int64)
     if len(peaks) < 2:
         empty = np.zeros(0)
-        return Decay(math.nan, empty, t[peaks], x[peaks], np.ones(len(peaks), dtype=bool))
+        return Decay(math.nan, empty, t[peaks], x[peaks])
     flows = np.ones(len(peaks), dtype=bool)
     for index in range(1, len(peaks)):
         flows[index] = np.max(drive[peaks[index - 1] : peaks[index] + 1]) > drive_threshold
@@ -104,7 +101,7 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
         mean = mean if mean >= QUICK * ratios[0] else float(ratios[0])
     else:
         mean = float(ratios[0])
-    return Decay(mean, ratios, t[peaks], x[peaks], flows)
+    return Decay(mean, ratios, t[peaks], x[peaks])
 
 
 def energy_damping(response: Response, start_s: float, omega: float) -> float:

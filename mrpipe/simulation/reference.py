@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.controller import ControllerOptions
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.kalman import discrete_kalman_gains
 from mrpipe.dampers.model import DamperModel

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mrpipe.control import ControllerOptions, Gains, build_controller, inverse_table
-from mrpipe.control.controller import DYNAMIC_RANGE, Controller
+from mrpipe.control.controller import Controller
+from mrpipe.control.controller_options import DYNAMIC_RANGE
 from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FAULT,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import load_parameter_set
-from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.controller import Controller, build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.dampers.model import damper_from_parameter_set

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from mrpipe.control.controller import ControllerOptions, build_controller
+from mrpipe.control.controller import build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.errors import UserError
 from mrpipe.simulation.acting import acting, acting_together, excitation_at

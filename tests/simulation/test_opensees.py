@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrpipe.control.controller import ControllerOptions, build_controller
+from mrpipe.control.controller import build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import recorded

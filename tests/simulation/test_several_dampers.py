@@ -9,7 +9,8 @@ import pytest
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.control.central import CENTRAL, Sensors, central_regulator
-from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.controller import Controller, build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.control.lqg import Weights, lqg_observer

@@ -11,7 +11,8 @@ import pytest
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.campaigns import Campaign, Recording
-from mrpipe.control.controller import ControllerOptions, Gains, build_controller
+from mrpipe.control.controller import Gains, build_controller
+from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
