@@ -16,6 +16,12 @@ from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
 from mrpipe.words import listed
 
+NUMERIC_IN_MATLAB = (
+    "save each signal in MATLAB as a numeric vector or as a field of a structure, because cell arrays, tables and "
+    "timetables cannot be read"
+)
+"""Remedy for a variable of MATLAB that is no array of numbers."""
+
 _INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")
 
 
@@ -126,7 +132,7 @@ class DataFile:
             raise values
         array = np.asarray(values)
         if array.dtype.kind not in "fiub":
-            raise UserError(self.path, where, f"column {column!r} holds no numbers", "name a column of numbers")
+            raise UserError(self.path, where, f"column {column!r} holds no numbers", self._remedy_of(array.dtype.kind))
         array = array.astype(np.float64)
         if index is not None:
             array = self._pick(array, index, column, where)
@@ -146,6 +152,14 @@ class DataFile:
         if isinstance(column, str) and _plain(column) == _plain(name):
             self._require_one(name, array, where)
         return np.ascontiguousarray(array)
+
+    def _remedy_of(self, kind: str) -> str:
+        """Return what to do about values of a kind (numpy's letter) that are no real numbers."""
+        if kind == "c":
+            return "they are complex: store the real part"
+        if self.path.suffix.lower() == ".mat":
+            return NUMERIC_IN_MATLAB
+        return "name a column of numbers, and write numbers without quotes"
 
     def _resolve(self, column: str | int, where: str) -> tuple[str, str | None]:
         if isinstance(column, str) and not isinstance(column, bool):
