@@ -20,7 +20,7 @@ NUMERIC_IN_MATLAB = (
     "save each signal in MATLAB as a numeric vector or as a field of a structure, because cell arrays, tables and "
     "timetables cannot be read"
 )
-"""Remedy for a variable of MATLAB that is no array of numbers."""
+"""Remedy for a variable of MATLAB without an array of numbers."""
 
 _INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")
 
@@ -154,7 +154,7 @@ class DataFile:
         return np.ascontiguousarray(array)
 
     def _remedy_of(self, kind: str) -> str:
-        """Return what to do about values of a kind (numpy's letter) that are no real numbers."""
+        """Return what to do about values of another kind (letter of numpy) than real numbers."""
         if kind == "c":
             return "they are complex: store the real part"
         if self.path.suffix.lower() == ".mat":
