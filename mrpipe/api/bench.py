@@ -268,9 +268,10 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
     Raises
     ------
     UserError
-        If no test trains, or none validates.
+        If no test trains, or none validates, or if the campaign declares an unknown effect.
     """
     from mrpipe.config.sections.close_loop import CloseLoopSettings
+    from mrpipe.effects.declared import declared_effects
     from mrpipe.effects.library import damper_effects, effects_named, load_effect_file
     from mrpipe.tracing.bench.trace import trace_campaign
     from mrpipe.tracing.loop.augmented import traced_damper
@@ -278,12 +279,12 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
 
     chosen = settings_of(CloseLoopSettings, "close_loop", settings)
     _require(tests, "training", "validation")
-    known = damper_effects()
-    declared = [known[name] for name in tests.campaign.declared_effects if name in known]
+    library = effects_named(chosen.candidates, chosen.effect_files)
+    campaign = tests.campaign
     traced = trace_campaign(
         list(tests),
-        effects_named(chosen.candidates, chosen.effect_files),
-        declared,
+        library,
+        declared_effects(campaign.declared_effects, {**damper_effects(), **library}, campaign.file),
         tracing_options(chosen, tests[0].drive_unit),
         rng=np.random.default_rng(seed),
         jobs=jobs,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mrpipe.api.structure import IdentifiedFrame
 from mrpipe.dampers.model import DamperModel
+from mrpipe.errors import UserError
 from mrpipe.exports.contract import Subject
 from mrpipe.networks.network import Network
 from mrpipe.structures import Frame, floor_position
@@ -19,7 +20,7 @@ def export(
     formats: Sequence[str] = (),
     prefix: str = "mrpipe",
     floor: int = 1,
-    drive_unit: str = "A",
+    drive_unit: str = "",
 ) -> list[Path]:
     """Write a model for other programs, with test vectors and a README; return the files.
 
@@ -36,15 +37,17 @@ def export(
     floor
         Floor that the damper acts on, from 1, where the model is a frame.
     drive_unit
-        `A` or `V`, where the model is a network.
+        `A` or `V`, where the model is a network. Empty: the files have the word `drive` in place of the unit.
 
     Raises
     ------
     UserError
-        If the model has no such format, or a step of the damper cannot be translated.
+        If the model has no such format, a step of the damper cannot be translated, or `drive_unit` is neither A nor V.
     """
     from mrpipe.exports.library import write_export
 
+    if drive_unit not in ("", "A", "V"):
+        raise UserError("export", f"drive_unit: {drive_unit!r}", "is not the unit of a drive in SI", "give A or V")
     subject = _subject(model, prefix, floor, drive_unit)
     target = Path(folder)
     return [target / name for name in write_export(subject, target, formats)]
@@ -61,6 +64,6 @@ def _subject(
         return damper_subject(model, prefix=prefix)
     if isinstance(model, Network):
         name = "inverse" if model.features.target == "drive" else "forward"
-        return network_subject(model, name, prefix, drive_unit=drive_unit)
+        return network_subject(model, name, prefix, **({"drive_unit": drive_unit} if drive_unit else {}))
     frame = model.frame if isinstance(model, IdentifiedFrame) else model
     return frame_subject(frame, floor_position(frame.floors, floor), prefix=prefix)

@@ -14,6 +14,13 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
+from mrpipe.words import listed
+
+NUMERIC_IN_MATLAB = (
+    "save each signal in MATLAB as a numeric vector or as a field of a structure, because cell arrays, tables and "
+    "timetables cannot be read"
+)
+"""Remedy for a variable of MATLAB without an array of numbers."""
 
 _INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")
 
@@ -108,7 +115,8 @@ class DataFile:
         Raises
         ------
         UserError
-            If there is no such column, or if it is not a vector of numbers.
+            If there is no such column, if several columns with different numbers have this name, or if it is not a
+            vector of numbers.
         """
         name, index = self._resolve(column, where)
         try:
@@ -124,7 +132,7 @@ class DataFile:
             raise values
         array = np.asarray(values)
         if array.dtype.kind not in "fiub":
-            raise UserError(self.path, where, f"column {column!r} holds no numbers", "name a column of numbers")
+            raise UserError(self.path, where, f"column {column!r} holds no numbers", self._remedy_of(array.dtype.kind))
         array = array.astype(np.float64)
         if index is not None:
             array = self._pick(array, index, column, where)
@@ -141,7 +149,17 @@ class DataFile:
             raise UserError(
                 self.path, where, f"column {column!r} is not a vector ({shape})", f"pick one column, as in {name}[:,0]"
             )
+        if isinstance(column, str) and _plain(column) == _plain(name):
+            self._require_one(name, array, where)
         return np.ascontiguousarray(array)
+
+    def _remedy_of(self, kind: str) -> str:
+        """Return what to do about values of another kind (letter of numpy) than real numbers."""
+        if kind == "c":
+            return "they are complex: store the real part"
+        if self.path.suffix.lower() == ".mat":
+            return NUMERIC_IN_MATLAB
+        return "name a column of numbers, and write numbers without quotes"
 
     def _resolve(self, column: str | int, where: str) -> tuple[str, str | None]:
         if isinstance(column, str) and not isinstance(column, bool):
@@ -172,6 +190,18 @@ class DataFile:
             return self.names[0], f":,{column}"
         asked = str(column).split("[")[0]
         raise UserError(self.path, where, f"no column {column!r}", nearest(asked, self.names))
+
+    def _require_one(self, name: str, array: FloatArray, where: str) -> None:
+        """Refuse a name that several columns of a table have, unless all of them hold the same numbers."""
+        places = [place for place, other in enumerate(self.names) if other == name or other.startswith(f"{name}#")]
+        if not self.table or len(places) < 2:
+            return
+        for place in places:
+            other = self.fetch(self.names[place])
+            if not isinstance(other, UserError) and not np.array_equal(np.asarray(other), array, equal_nan=True):
+                said = listed([str(place) for place in places])
+                remedy = f"name the right one by its position, counted from 0, as in column: {places[0]}"
+                raise UserError(self.path, where, f"columns {said} have the name {name!r}", remedy)
 
     def _pick(self, array: FloatArray, index: str, column: str | int, where: str) -> FloatArray:
         parts: list[Any] = []

@@ -47,6 +47,8 @@ def not_found(path: Path) -> UserError:
         names = sorted(item.name for item in path.parent.iterdir())
     except (OSError, ValueError):
         names = []
+    if "\\" in path.name and (path.parent / path.name.replace("\\", "/")).is_file():
+        return UserError(path, "", "data file not found", "write / in place of \\ between folder and file")
     wanted = {_letters(path.name), _letters(path.stem)}
     alike = next((name for name in names if {_letters(name), _letters(Path(name).stem)} & wanted), "")
     return UserError(path, "", "data file not found", f"did you mean {alike}? {remedy}" if alike else remedy)

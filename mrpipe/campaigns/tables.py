@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.artifacts.yaml_source import shown
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.logger import read_logger
 from mrpipe.campaigns.schema import TextEntry
@@ -39,7 +40,7 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     Raises
     ------
     UserError
-        If the text holds no row of numbers.
+        If the text holds no row of numbers, or if its first sample is not a number in some column.
     """
     layout = layout or TextEntry()
     lines = text.replace("\u2212", "-").splitlines()  # a minus sign of typesetters
@@ -51,6 +52,7 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     first, delimiter, decimal = _first_row(path, lines, layout, comment)
     fields = _split(lines[first], delimiter)
     headers = _headers(lines[layout.skip_lines : first], delimiter, comment, fields)
+    _refuse_damaged_samples(path, lines[:first], delimiter, headers)
     width = max([len(fields), *(len(row) for row in headers)])
     rows = [index for index in range(first, len(lines)) if lines[index].strip() and lines[index][0] not in comment]
     frame = _rows(path, [lines[index] for index in rows], rows, delimiter, decimal, width)
@@ -112,6 +114,22 @@ def _headers(lines: list[str], delimiter: str | None, comment: str, fields: list
     return sorted(rows, key=lambda row: row[0].lower() not in _LABELS)
 
 
+def _refuse_damaged_samples(path: Path, lines: list[str], delimiter: str | None, headers: list[list[str]]) -> None:
+    """Raise for a sample above the first row of numbers, such as `0.001, OVL, 2.5`, which would pass for a header.
+
+    It begins with a number, most of its fields are numbers, and a line above it names the columns.
+    """
+    for row in headers[1:]:
+        filled = [item for item in row if item]
+        words = [item for item in filled if not (_NUMBER.match(item) or is_stamp(item))]
+        if not filled or filled[0] != row[0] or row[0] in words or 2 * len(words) >= len(filled):
+            continue
+        name = headers[0][row.index(words[0])] if len(headers[0]) == len(row) else str(row.index(words[0]))
+        place = next(index for index, line in enumerate(lines) if words[0] in _split(line, delimiter))
+        where = f"line {place + 1}, column {name}"
+        raise UserError(path, where, f"{shown(words[0])} is not a number", "delete the row, or write a number")
+
+
 def _split(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
@@ -153,7 +171,9 @@ def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) ->
 def _refuse_thousands(path: Path, lines: list[str], layout: TextEntry) -> None:
     """Raise for the first row of numbers with separators of thousands."""
     for index in range(layout.skip_lines, min(len(lines), layout.skip_lines + 200)):
-        for delimiter in [layout.delimiter] if layout.delimiter else ["\t", ";"]:
+        # where the comma is the delimiter, only quotes keep a number with separators together
+        comma = [","] if '"' in lines[index] else []
+        for delimiter in [layout.delimiter] if layout.delimiter else ["\t", ";", *comma]:
             fields = [item for item in _split(lines[index].strip("\r\n"), delimiter) if item]
             grouped = [item for item in fields if _THOUSANDS.match(item) and not _NUMBER.match(item)]
             known = [item for item in fields if item in grouped or _NUMBER.match(item) or is_stamp(item)]
@@ -214,7 +234,10 @@ def _numbers(path: Path, column: Any, name: str, lines: tuple[int, ...], decimal
         row = int(np.argmax(wrong))
         found = str(column.iloc[row])
         where = f"line {lines[row]}, column {name}"
-        raise UserError(path, where, f"{found!r} is not a number", _remedy(found, wrong, decimal))
+        remedy = _remedy(found, wrong, decimal)
+        if found.strip() == name and remedy == "write a number":
+            remedy = "the header stands here again, as if the recording had been started again: make two files of it"
+        raise UserError(path, where, f"{shown(found)} is not a number", remedy)
     return np.asarray(numbers, dtype=np.float64)
 
 

@@ -75,6 +75,25 @@ def refuse_constant_drive(pipeline: Pipeline, names: Collection[str]) -> None:
         require_drives(load_campaign(path))
 
 
+def refuse_unknown_effects(pipeline: Pipeline, names: Collection[str]) -> None:
+    """Refuse a campaign that declares an unknown effect where `close-loop` is needed.
+
+    Without this, the stages before the tracing would be built first, which takes minutes.
+
+    Raises
+    ------
+    UserError
+        If that is so; the message names the line of the campaign file and the nearest known effect.
+    """
+    from mrpipe.campaigns.header import read_header
+    from mrpipe.cli.checking import measured_campaigns, own_effects, require_known_effects, with_required
+
+    if "close-loop" not in with_required(pipeline.stages, names):
+        return
+    for path in measured_campaigns(pipeline.loaded).values():
+        require_known_effects(read_header(path), own_effects(pipeline.loaded))
+
+
 def require_motion(loaded: LoadedConfig, campaign: Campaign) -> None:
     """Refuse a bench campaign without the acceleration that `prepare.motion` needs.
 

@@ -166,7 +166,7 @@ def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> 
 
     if "" in own:
         return
-    known = known_effects() | set(own)
+    known = effects_of_rig(header.rig) | set(own)
     for index, name in enumerate(header.declared_effects):
         if name not in known:
             source = read_yaml(header.file)
@@ -207,6 +207,11 @@ def known_effects() -> set[str]:
     from mrpipe.effects.structural.library import all_structural_effects
 
     return {*known_damper_effects(), *all_structural_effects()}
+
+
+def effects_of_rig(rig: str) -> set[str]:
+    """Return the names of the effects of the library that a campaign of this rig can declare."""
+    return known_effects() if rig == "shear-frame" else known_damper_effects()
 
 
 def known_damper_effects() -> set[str]:

@@ -74,11 +74,13 @@ def _write(plot: Path, content: Mapping[str, Any], first: KeptRun, second: KeptR
 
 # --- for a person ----------------------------------------------------------------------------------------------------
 def _print(content: Mapping[str, Any]) -> None:
+    from mrpipe.reporting.words import number
+
     print(f"first:  {content['runs'][0]}")
     print(f"second: {content['runs'][1]}")
     for name, verdict in zip(("first", "second"), content["verdicts"], strict=True):
         if verdict is not None:
-            before, after = _short(verdict["before_nrmse"]), _short(verdict["after_nrmse"])
+            before, after = (number(verdict[key]) for key in ("before_nrmse", "after_nrmse"))
             print(f"verdict of the {name} run: {verdict['verdict']} (NRMSE {before} before, {after} after)")
     _print_rows(
         "settings",

@@ -171,13 +171,15 @@ def _warn_of_another_configuration(options: CommonOptions, loaded: LoadedConfig,
 def _require_own(directory: Path) -> None:
     """Refuse a directory with files that no run has written, because the run would write over files of these names.
 
-    A run that was killed before its first stage ended has left its lock and its configuration.
+    A run that was killed before its first stage ended has left its lock and its configuration, or its lock and its log.
     """
+    from mrpipe.pipeline.runner import LOG
+
     if not directory.is_dir() or (directory / "manifests").is_dir():
         return
-    if (directory / ".lock").exists() and (directory / "config.yaml").is_file():
-        return
     there = sorted(path.name for path in directory.iterdir() if not path.name.startswith("."))
+    if (directory / ".lock").exists() and ("config.yaml" in there or there == [LOG]):
+        return
     if there:
         problem = f"holds {listed(there[:3])}{' and more' if len(there) > 3 else ''}, which no run has written"
         raise UserError("--run", str(directory), problem, "give an empty or new directory")

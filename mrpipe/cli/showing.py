@@ -65,9 +65,9 @@ def unknown_effects(header: CampaignHeader) -> list[Finding]:
         return []
     from mrpipe.artifacts.yaml_source import nearest
     from mrpipe.campaigns.plausibility import Finding
-    from mrpipe.cli.checking import known_damper_effects, known_effects
+    from mrpipe.cli.checking import effects_of_rig
 
-    known = known_effects() if header.rig == "shear-frame" else known_damper_effects()
+    known = effects_of_rig(header.rig)
     found = []
     for index, name in enumerate(header.declared_effects):
         if name in known:

@@ -47,9 +47,10 @@ def build_and_print(
     Raises
     ------
     UserError
-        If a requested stage has no data, or if it needs an inverse model and the drive of the campaign never changes.
+        If a requested stage has no data, if it needs an inverse model and the drive of the campaign never changes, or
+        if it traces effects and the campaign declares an unknown one.
     """
-    from mrpipe.cli.campaign_refusal import refuse_constant_drive
+    from mrpipe.cli.campaign_refusal import refuse_constant_drive, refuse_unknown_effects
     from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
     from mrpipe.reporting.headlines import in_brief
@@ -59,6 +60,7 @@ def build_and_print(
             _require_use(names, pipeline, options.campaign)
         if options.force:
             pipeline.force = frozenset(names)
+        refuse_unknown_effects(pipeline, names)
         if where_possible:
             names = _without_constant_drive(pipeline, names)
         else:

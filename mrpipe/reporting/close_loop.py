@@ -187,7 +187,7 @@ def _before_and_after(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -
             "loops",
             loops_before_and_after(shown),
             "Validation tests: the one with the largest improvement, one with a medium error, and the one with the "
-            "largest error after. The models are simulated without the measured force.",
+            "largest error after; a test may be two of these. The models are simulated without the measured force.",
         )
     more = f"; the {MOST_BARS} with the largest errors of {len(rows)}" if len(rows) > MOST_BARS else ""
     sink.figure(

@@ -64,7 +64,7 @@ def response_by_law(found: Mapping[str, Any]) -> Figure:
         axes[:, 0],
         (
             ("rms_x_top_m", 1e3, "rms top displacement [mm]"),
-            ("rms_a1_m_s2", 1.0, "rms acceleration relative to the ground, floor 1 [m/s²]"),
+            ("rms_a1_m_s2", 1.0, "rms acceleration of floor 1\nrelative to the ground [m/s²]"),
         ),
         strict=True,
     ):

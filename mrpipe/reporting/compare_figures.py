@@ -83,7 +83,7 @@ def write_page(path: Path, content: Mapping[str, Any], figures: Sequence[Overlay
 
     environment = Environment(loader=PackageLoader("mrpipe.reporting", "templates"), autoescape=True, trim_blocks=True)
     tables = [
-        {"title": title, "rows": len(frame), "html": Markup(frame.to_html(index=False, border=0, na_rep="-"))}
+        {"title": title, "rows": len(frame), "html": Markup(_readable(frame).to_html(index=False, border=0))}
         for title, frame in _tables(content).values()
     ]
     drawings = [{"svg": Markup(as_svg(item.figure)), "caption": item.caption} for item in figures]
@@ -92,6 +92,17 @@ def write_page(path: Path, content: Mapping[str, Any], figures: Sequence[Overlay
     )
     atomic_write_text(path, page)
     return [path]
+
+
+def _readable(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a table for a reader: six digits, also of very small numbers, and `-` for what one run lacks."""
+
+    def shown(value: Any) -> str:
+        if isinstance(value, float):
+            return "-" if np.isnan(value) else f"{value:.6g}"
+        return "-" if value is None else str(value)
+
+    return frame.map(shown).rename(columns={"stages": "read by", "relative_difference": "change (relative)"})
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, tuple[str, pd.DataFrame]]:

@@ -53,7 +53,7 @@ def comparison_bars(rows: Sequence[tuple[str, float, float]]) -> Figure:
     axis.barh(place + 0.2, [row[2] for row in rows], height=0.36, color=COLOURS[0], label="validation")
     axis.set_yticks(place, [row[0] for row in rows])
     axis.invert_yaxis()
-    axis.legend(fontsize=7, frameon=False)
+    figure.legend(loc="outside upper center", ncols=2, fontsize=8, frameon=False)
     label(axis, "NRMSE [1]", "")
     return figure
 

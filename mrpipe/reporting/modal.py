@@ -176,7 +176,7 @@ def decays(results: Sequence[DecayResult]) -> Figure:
         step = max(1, result.time_s.size // _MOST_POINTS)
         row[0].plot(result.time_s[::step], result.coordinate[::step], color=MEASURED, linewidth=0.5)
         row[0].plot(result.peak_time_s, result.peak, ".", color=MODEL, markersize=3)
-        label(row[0], "time [s]", "m/s²", f"mode {result.mode}, {result.test}")
+        label(row[0], "time [s]", "modal coordinate [m/s²]", f"mode {result.mode}, {result.test}")
         row[1].plot(result.peak[:-2], result.point_to_point_series, ".", color=COLOURS[0], markersize=3)
         row[1].axhline(result.exponential_fit.value, color=MODEL, linewidth=1.0)
         scale = max(result.exponential_fit.value, 1e-6)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.networks.assembly import History, Samples
@@ -41,9 +42,11 @@ def training_progress(path: FloatArray, held_out: Sequence[float]) -> Figure:
     figure, axes = figure_with_axes(1, 2)
     axes[0, 0].semilogy(np.arange(len(path)), path, color=MODEL)
     label(axes[0, 0], "iteration", "training NRMSE", "The chosen start")
+    axes[0, 0].tick_params(axis="y", which="both", labelsize=8)
     ordered = np.sort(np.asarray(held_out, dtype=np.float64))
     axes[0, 1].plot(np.arange(1, len(ordered) + 1), ordered, "o", color=COLOURS[0])
     axes[0, 1].set_ylim(0.0, 1.15 * float(ordered[-1]))
+    axes[0, 1].xaxis.set_major_locator(MaxNLocator(integer=True))
     label(axes[0, 1], "start, by rank", "held-out NRMSE", "Spread over starts")
     return figure
 

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
@@ -21,7 +22,7 @@ from mrpipe.artifacts import atomic_write_text
 from mrpipe.reporting.facts import ReportStage, RunFacts
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.front.statements import statements
-from mrpipe.reporting.words import number
+from mrpipe.reporting.words import number, readable_unit
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed
 
@@ -31,6 +32,10 @@ _ROWS_SHOWN = 15
 
 _NUMBER_AND_UNIT = re.compile(r"(\d) (?=(?:%|[µmk]?(?:m|N|A|V|s|g|Hz|rad|kg|min|h|J)(?:/|\b)))")
 """A space that a line must not break at, because the unit belongs to the number."""
+
+
+_IS_NUMBER = re.compile(r"-?|[-+]?[\d.]+(?:e[-+]?\d+)?")
+"""A number, or a cell without one."""
 
 
 def first_screen(facts: RunFacts, columns: int = 100) -> list[str]:
@@ -161,9 +166,24 @@ def _item_html(directory: Path, item: Mapping[str, Any]) -> Markup:
 
 
 def _table_html(frame: pd.DataFrame) -> str:
-    """Return a table whose numbers, and texts that are numbers, are aligned to the right."""
-    table = frame.to_html(index=False, border=0, na_rep="-", justify="left", float_format=_four_digits)
-    return re.sub(r"<td>(-|[-+]?[\d.]+(?:e[-+]?\d+)?)</td>", r"<td class='number'>\1</td>", table)
+    """Return a table; columns of numbers, or of texts that are numbers, are aligned to the right with their heading."""
+    columns = [(str(name), [_shown(str(name), value) for value in frame.iloc[:, k]]) for k, name in enumerate(frame)]
+    kinds = [" class='number'" if all(map(_IS_NUMBER.fullmatch, cells)) else "" for _, cells in columns]
+    heads = "".join(f"<th{kind}>{html.escape(name)}</th>" for kind, (name, _) in zip(kinds, columns, strict=True))
+    rows = "".join(
+        f"<tr>{''.join(f'<td{kind}>{html.escape(cell)}</td>' for kind, cell in zip(kinds, row, strict=True))}</tr>\n"
+        for row in zip(*(cells for _, cells in columns), strict=True)
+    )
+    return f"<table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>"
+
+
+def _shown(column: str, value: Any) -> str:
+    """Return a cell as people read it: a few digits, `-` for a missing value, no unit for a ratio."""
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if column == "unit":
+        return readable_unit("" if pd.isna(value) else str(value))
+    return "-" if pd.isna(value) else _four_digits(float(value)) if isinstance(value, float) else str(value)
 
 
 def _figure_html(svg: str, caption: str) -> Markup:

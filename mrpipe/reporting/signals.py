@@ -38,7 +38,7 @@ def spectra_before_and_after(
         if top > 0.0:
             axis.set_ylim(top * 1e-14, top * 10.0)
         label(axis, "frequency [Hz]", f"density [({unit})²/Hz]", name)
-        axis.legend(loc="upper right", fontsize=7, frameon=False)
+        axis.legend(loc="lower left", fontsize=7, frameon=False)
     for axis in axes.ravel()[len(spectra) :]:
         axis.set_visible(False)
     return figure

@@ -16,6 +16,9 @@ from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.training_range import RangeCheck
 
+VISCOUS = "vd"
+"""Law that the others are compared with."""
+
 
 def describe(
     sink: Sink,
@@ -38,7 +41,8 @@ def describe(
         Indices of the run, and of vd under the same excitation where it was run.
     """
     sink.text(_words(law, excitation, values))
-    sink.table("indices", _table(law, values, viscous), "Indices, and those of vd under the same excitation (SI).")
+    others = ", and those of vd under the same excitation" if viscous is not None and law != VISCOUS else ""
+    sink.table("indices", _table(law, values, viscous), f"Indices{others} (SI).")
     last = excitation.steady_s[1]
     cycle = 2.0 * np.pi / excitation.frequency_rad_s if np.isfinite(excitation.frequency_rad_s) else last / 4.0
     shown = (response.time_s >= last - 4.0 * cycle) & (response.time_s < last)
@@ -93,8 +97,9 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
     return (
         f"Law {law}, {excitation.details['kind']} excitation: rms top displacement "
         f"{1e3 * values['rms_x_top_m']:.1f} mm, first floor {1e3 * values['rms_x1_m']:.1f} mm; "
-        f"{values['switched_off_share']:.0%} of the time switched off, "
-        f"{values['clipped_share']:.0%} clipped.{decay} Energy balance closed to {values['energy_balance_error']:.1e}; "
+        f"{100.0 * values['switched_off_share']:.0f} % of the time switched off, "
+        f"{100.0 * values['clipped_share']:.0f} % clipped.{decay} "
+        f"Energy balance closed to {values['energy_balance_error']:.1e}; "
         f"{values['real_time_factor']:.0f} times real time."
     )
 
@@ -102,7 +107,7 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
 def _table(law: str, values: Mapping[str, Any], viscous: Mapping[str, Any] | None) -> pd.DataFrame:
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     frame = pd.DataFrame({"index": list(numbers), law: list(numbers.values())})
-    if viscous is not None:
+    if viscous is not None and law != VISCOUS:
         frame["vd"] = [viscous.get(key) for key in numbers]
         frame["over vd"] = [value / viscous[key] if viscous.get(key) else None for key, value in numbers.items()]
     return frame

@@ -28,6 +28,7 @@ _LACKING = {
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
+    from mrpipe.effects.declared import declared_effects
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
@@ -37,12 +38,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
     settings = context.settings.close_loop
     campaign = load_campaign(context.inputs["campaign:bench"])
+    library = effects_named(settings.candidates, settings.effect_files)
+    declared = declared_effects(campaign.declared_effects, {**damper_effects(), **library}, campaign.file)
     tests = read_prepared(context.artifact("prepare"))
-    known = damper_effects()
-    declared = [known[name] for name in campaign.declared_effects if name in known]
-    for name in campaign.declared_effects:
-        if name not in known:
-            context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
     chosen, fitted = _identified(context)
     options = tracing_options(
         settings,
@@ -50,7 +48,6 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         context.settings.identify_damper.form_files,
         _declared(context) if chosen is None else chosen.form,
     )
-    library = effects_named(settings.candidates, settings.effect_files)
     traced = trace_campaign(
         tests, library, declared, options, known=fitted, rng=context.rng, jobs=context.jobs, progress=context.progress
     )

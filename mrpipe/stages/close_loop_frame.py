@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
+    from mrpipe.effects.declared import declared_effects
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
     from mrpipe.reporting import close_loop_frame as section
@@ -38,16 +39,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             "the masses of the floors are not given, or not all of them, so no storey force can be computed: "
             "write frame: {floor_masses_kg: [...]} in campaign.yaml"
         )
-    known = {**all_structural_effects(), **damper_effects()}
-    for name in campaigns[0].declared_effects:
-        if name not in known:
-            context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
+    library = structural_effects(settings.candidates, settings.effect_files)
+    for campaign in campaigns:
+        known = {**all_structural_effects(), **damper_effects(), **library}
+        declared_effects(campaign.declared_effects, known, campaign.file)
     asked = tracing_options(settings, campaigns[0].drive_unit)
     # few long tests: fewer forms are refitted, and nothing filtered their force
     options = asked.changed(refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
     traced = trace_structure(
         campaigns,
-        structural_effects(settings.candidates, settings.effect_files),
+        library,
         damper_effects(),
         options,
         rng=context.rng,

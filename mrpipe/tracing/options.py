@@ -158,11 +158,11 @@ class TracingOptions(TracingSettings):
     """How a campaign is traced: the settings with the declared base form by name, and the unit of the drive."""
 
     model: str = Field(DEFAULT_FORM, description="Declared base form.")
-    drive_unit: str = Field("A", description="Unit of the drive, A or V.")
+    drive_unit: str = Field("", description="Unit of the drive, A or V. A tracing sets it to that of its tests.")
 
 
 def tracing_options(
-    settings: TracingSettings, drive_unit: str, form_files: Sequence[Path] = (), identified: str = DEFAULT_FORM
+    settings: TracingSettings, drive_unit: str = "", form_files: Sequence[Path] = (), identified: str = DEFAULT_FORM
 ) -> TracingOptions:
     """Return the options of a tracing, on a bench or of a structure.
 
@@ -171,7 +171,7 @@ def tracing_options(
     settings
         Section `close_loop` of the settings.
     drive_unit
-        `A` or `V`; empty for A.
+        `A` or `V`. Empty: not known yet; the tracing sets it to that of its tests.
     form_files
         Files of the user that define base forms with which the damper was identified; these forms are tried in the
         tracing too.
@@ -182,4 +182,4 @@ def tracing_options(
     values["form_files"] = tuple(dict.fromkeys([*settings.form_files, *form_files]))
     if settings.model == IDENTIFIED:
         values["model"] = identified
-    return TracingOptions(**values, drive_unit=drive_unit or "A")
+    return TracingOptions(**values, drive_unit=drive_unit)

@@ -23,6 +23,7 @@ from mrpipe.errors import UserError
 from mrpipe.simulation.storage import write_response
 from mrpipe.structures import frame_from_parameter_set, shear_frame, write_frame
 from tests.campaigns.builders import campaign, motion
+from tests.control.conftest import random_network
 from tests.effects.test_damper import added
 
 
@@ -177,6 +178,23 @@ def test_models_are_exported_by_kind(tmp_path: Path) -> None:
     assert all(file.is_file() for file in files)
     files = mrpipe.export(frame, tmp_path / "frame", formats=["json"], floor=2)
     assert [file.name for file in files] == ["frame.json", "vectors.csv", "README.md"]
+
+
+@pytest.mark.property
+def test_an_exported_network_names_no_unit_of_the_drive_that_was_not_given(tmp_path: Path) -> None:
+    network = random_network(("velocity", "force"), "drive", 3, True)
+    for unit, heading in (("", "drive [drive]"), ("V", "drive [V]")):
+        mrpipe.export(network, tmp_path, formats=["json"], drive_unit=unit)
+        assert heading in (tmp_path / "vectors.csv").read_text(encoding="utf-8")
+    with pytest.raises(UserError, match="give A or V"):
+        mrpipe.export(network, tmp_path, drive_unit="mA")
+
+
+@pytest.mark.planted
+def test_an_unknown_declared_effect_is_refused_before_the_tracing(tests: mrpipe.api.PreparedTests) -> None:
+    declared = replace(tests.campaign, declared_effects=("heating", "backlsh"))
+    with pytest.raises(UserError, match=r"declared_effects\[1\]: unknown effect 'backlsh'; did you mean backlash"):
+        mrpipe.trace(replace(tests, campaign=declared))
 
 
 @pytest.mark.property

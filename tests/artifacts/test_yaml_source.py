@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from mrpipe.artifacts.yaml_source import parse, read_yaml
+from mrpipe.artifacts.yaml_source import nearest, parse, read_yaml
 from mrpipe.errors import UserError
 
 BILLION_LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -124,3 +124,11 @@ def test_a_value_of_several_types_is_named_by_its_key(tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
         source.build(Channel, source.content, ())
     assert str(caught.value).endswith("a.yaml: line 1, column: is ['F']; a text expected")
+
+
+@pytest.mark.golden
+def test_of_equally_close_words_the_one_with_the_same_first_letter_is_named() -> None:
+    assert nearest("Fx", ["t", "x", "i", "F"]) == "did you mean F?"
+    assert nearest("xF", ["t", "x", "i", "F"]) == "did you mean x?"
+    assert nearest("qq", ["t", "x"]) == "known: t, x"
+    assert nearest("t", ["b/t", "a/t"]) == "did you mean a/t?"

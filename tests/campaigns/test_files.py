@@ -295,3 +295,11 @@ def test_a_sampling_interval_in_place_of_a_clock_names_the_way_out(tmp_path: Pat
     savemat(tmp_path / "a.mat", {"dt": 0.002, "x": np.arange(50.0)})
     with pytest.raises(UserError, match=r"column 'dt' holds one number; .* give sampling_rate_hz in its place"):
         open_data_file(tmp_path / "a.mat").column("dt", "")
+
+
+@pytest.mark.golden
+def test_a_path_of_windows_names_the_sign_between_folders(tmp_path: Path) -> None:
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "raw" / "a.csv").write_text("t,x\n0,1\n1,2\n", encoding="utf-8")
+    with pytest.raises(UserError, match=r"data file not found; write / in place of"):
+        open_data_file(tmp_path / r"raw\a.csv")

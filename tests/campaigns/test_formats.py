@@ -286,3 +286,36 @@ def test_a_campaign_of_mixed_formats(tmp_path: Path) -> None:
     tests[0]["file"] = "one.parquet"
     read = load_campaign(campaign(tmp_path, tests=tests))
     assert [test.sampling_rate_hz for test in read.recordings] == [1000.0, 1000.0]
+
+
+@pytest.mark.golden
+def test_a_tdms_file_that_was_cut_off_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "cut.tdms"
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", name, FORCE) for name in ("x", "F")])
+    path.write_bytes(path.read_bytes()[:-1000])
+    with pytest.raises(UserError, match=r"cut.tdms: is cut off: its last segment is shorter"):
+        open_data_file(path)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.golden
+def test_variables_of_matlab_that_are_no_numbers_name_the_remedy(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    cells = np.empty((1, 2), dtype=object)
+    cells[0, :] = [TIME, FORCE]
+    savemat(tmp_path / "a.mat", {"c": cells, "z": FORCE + 1j})
+    old = open_data_file(tmp_path / "a.mat")
+    with pytest.raises(UserError, match=r"column 'c' holds no numbers; save each signal in MATLAB as a numeric vector"):
+        old.column("c", "")
+    with pytest.raises(UserError, match="complex: store the real part"):
+        old.column("z", "")
+    # a table of MATLAB 7.3 is stored as numbers that mean nothing without MATLAB
+    with h5py.File(tmp_path / "b.mat", "w") as handle:
+        table = handle.create_dataset("tt", data=np.arange(6, dtype="u4")[None, :])
+        table.attrs["MATLAB_class"] = np.bytes_("timetable")
+        table.attrs["MATLAB_object_decode"] = np.int32(3)
+    with pytest.raises(UserError, match=r"b.mat: variable tt: is a timetable of MATLAB; save each signal in MATLAB"):
+        open_data_file(tmp_path / "b.mat").column("tt", "")

@@ -135,3 +135,45 @@ def test_separators_of_thousands_in_the_first_row_are_named(tmp_path: Path) -> N
     assert "line 2: '1.999,4' is not a number; write numbers without separators of thousands, as 1999,4" in str(
         caught.value
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,x,F\n0.0,OVL,2.5\n0.1,1.0,2.6\n0.2,1.1,2.7\n", "line 2, column x: 'OVL' is not a number; delete the row"),
+        ("t,x,F\ns,mm,N\n0.0,1.0,#N/A\n0.1,1.0,2.6\n", "line 3, column F: '#N/A' is not a number; delete the row"),
+    ],
+)
+def test_a_damaged_first_sample_is_no_header(text: str, message: str) -> None:
+    with pytest.raises(UserError) as caught:
+        table_of_text(Path("a.csv"), text)
+    assert message in str(caught.value)
+
+
+def test_a_line_of_ranges_above_the_samples_is_still_a_header() -> None:
+    table = table_of_text(Path("a.csv"), "t,x,F\nrange,10,500\n0.0,1.0,2.5\n0.1,1.1,2.6\n")
+    assert table.column("x", "").tolist() == [1.0, 1.1]
+
+
+def test_a_header_within_the_samples_names_the_restart() -> None:
+    table = table_of_text(Path("a.csv"), "t,x\n0,1\n1,2\nt,x\n0,1\n1,2\n")
+    with pytest.raises(UserError, match=r"line 4, column t: 't' is not a number; the header stands here again"):
+        table.column("t", "")
+
+
+def test_separators_of_thousands_in_quotes_are_named_and_a_long_word_is_shortened() -> None:
+    with pytest.raises(UserError, match=r"line 2: '1,746.8' is not a number; write numbers without separators"):
+        table_of_text(Path("a.csv"), 't,x\n"0.0","1,746.8"\n"0.1","1,747.8"\n')
+    zeros = table_of_text(Path("a.csv"), "t,x\n0,1\n1,2\n" + "\0" * 4096)
+    with pytest.raises(UserError, match="delete the lines after the last sample") as caught:
+        zeros.column("t", "")
+    assert len(str(caught.value)) < 250
+
+
+def test_a_name_of_several_columns_is_refused_where_their_numbers_differ() -> None:
+    same = table_of_text(Path("a.csv"), "t,x,t,F\n0,1,0,5\n1,2,1,6\n")
+    assert same.column("t", "").tolist() == [0.0, 1.0]
+    other = table_of_text(Path("a.csv"), "t,F,F\n0,1,5\n1,2,6\n")
+    with pytest.raises(UserError, match=r"columns 1 and 2 have the name 'F'; name the right one by its position"):
+        other.column("F", "")
+    assert other.column(2, "").tolist() == [5.0, 6.0]

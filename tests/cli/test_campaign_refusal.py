@@ -14,6 +14,8 @@ from mrpipe.cli import run
 from mrpipe.cli.options import CommonOptions
 from mrpipe.cli.session import session
 from mrpipe.cli.stage_commands import _without_constant_drive
+from mrpipe.errors import UserError
+from mrpipe.pipeline.runner import Pipeline
 from tests.campaigns.plausibility.rig import sound_tests
 
 from .test_check import project
@@ -66,6 +68,17 @@ def test_a_wrong_campaign_is_refused_before_any_stage(
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.parametrize("name", ["backlsh", "joint-frction"])
+def test_an_unknown_declared_effect_is_refused_before_any_stage(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path, declared_effects=["heating", name])
+    assert run(["close-loop", str(config), "--run", str(tmp_path / "runs" / "own"), "--quiet"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "campaign.yaml: line" in line and f"declared_effects[1]: unknown effect '{name}'" in line
+    assert not (tmp_path / "runs").exists()
+
+
 def test_one_drive_is_no_fault_where_no_inverse_model_is_asked_for(tmp_path: Path) -> None:
     config = project(tmp_path, _with_one_drive())
     assert run(["run", str(config), "--run", str(tmp_path / "run"), "--until", "assemble", "--quiet"]) == 0
@@ -109,3 +122,21 @@ def test_an_export_of_everything_leaves_out_what_needs_an_inverse_model(
     with session(CommonOptions(config=config, run=tmp_path / "run", quiet=True)) as pipeline:
         assert _without_constant_drive(pipeline, ["export-damper", "export-inverse"]) == ["export-damper"]
     assert "export-inverse is left out: the drive never changes" in capsys.readouterr().err
+
+
+def test_an_export_command_of_everything_builds_what_one_drive_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path, _with_one_drive())
+    built: list[str] = []
+
+    def build(_: Pipeline, name: str) -> Any:
+        built.append(name)
+        raise UserError("stage", name, "is not built in this test", "nothing")
+
+    monkeypatch.setattr(Pipeline, "build", build)
+    assert run(["export", "all", "--config", str(config), "--run", str(tmp_path / "run"), "--quiet"]) == 2
+    # the first of those that are left is built; without the rule the command had refused all of them before
+    assert built == ["export-damper"]
+    said = capsys.readouterr().err
+    assert "export-controller is left out: the drive never changes" in said and "export-inverse is left out" in said

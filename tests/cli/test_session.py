@@ -80,6 +80,12 @@ def test_a_directory_that_no_run_has_written_is_left_alone(tmp_path: Path) -> No
         (killed / "figures").mkdir()
     with session(CommonOptions(run=killed)) as pipeline:
         assert pipeline.run_directory == killed
+    earlier = tmp_path / "killed-before-its-configuration"
+    earlier.mkdir()
+    for name in (".lock", ".config.yaml.1.tmp", "log.txt"):
+        (earlier / name).touch()
+    with session(CommonOptions(run=earlier)) as pipeline:
+        assert pipeline.run_directory == earlier
     hidden = tmp_path / "hidden"
     hidden.mkdir()
     (hidden / ".gitkeep").touch()

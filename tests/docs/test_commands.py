@@ -121,7 +121,7 @@ RUNS = {
     "close-loop --campaign DIR --set close_loop.effect_files=[docs/examples/seal_squeeze.py]": (
         "close-loop --campaign data/rig --set close_loop.effect_files=[docs/examples/seal_squeeze.py]"
     ),
-    "close-loop --campaign data/$name --run /scratch/$USER/$name --jobs 1 --quiet --json": (
+    "close-loop --campaign data/$name --run /scratch/$USER/campaigns/$name --jobs 1 --quiet --json": (
         "close-loop --campaign data/rig --run runs/rig --jobs 1 --quiet --json"
     ),
     "simulate --law LAW": "simulate --law vd",
@@ -141,6 +141,7 @@ RUNS = {
         "--set design.stroke_limit_m=0.01"
     ),
     "export WHAT": "export damper",
+    "export damper": "export damper",
     "export frame": "export frame",
     "export inverse": "export inverse",
     "export opensees": "export opensees",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.networks.assembly import History, join, write_history
 from mrpipe.networks.network import FeatureSpec, spec_to_json
 from mrpipe.networks.options import THESIS_HIDDEN, SweepOptions, TrainingOptions
-from mrpipe.networks.plan import sweep_grid, training_plan
+from mrpipe.networks.plan import fit_doubt, sweep_grid, training_plan
 from mrpipe.signals.prepared import PreparedTest
 from tests.networks.rig import bench_test
 
@@ -72,3 +73,15 @@ def test_the_axes_of_a_sweep_cross_at_the_reference_network() -> None:
     assert set(star) <= {*full, grid.centre}
     assert len(full) == len(set(full)) == 2 * 2 * 2 * len(options.biases)
     assert np.all([candidate in star for candidate in (grid.centre,)])
+
+
+def test_a_constant_target_of_the_validation_tests_is_a_doubt_of_the_training() -> None:
+    plan = SimpleNamespace(spec=INVERSE)
+
+    def doubt(samples: int, nrmse: float, fit_percent: float) -> str | None:
+        pooled = SimpleNamespace(samples=samples, nrmse=nrmse, fit_percent=fit_percent)
+        return fit_doubt(SimpleNamespace(pooled=pooled), plan)  # type: ignore[arg-type]
+
+    assert doubt(100, 0.02, 96.0) is None
+    assert "the drive of the validation tests is constant" in str(doubt(100, 0.02, np.nan))
+    assert doubt(0, np.nan, np.nan) == "the campaign has no validation test"

@@ -13,7 +13,8 @@ from mrpipe.networks.assembly import join, samples
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.reporting.bench_tracing import candidate_ranking
 from mrpipe.reporting.dampers import damper_loops
-from mrpipe.reporting.front.figures import model_errors
+from mrpipe.reporting.front.figures import last_cycles, model_errors, shapes_on_frame
+from mrpipe.reporting.front.laws import History
 from mrpipe.reporting.networks import drive_histories
 from mrpipe.reporting.signals import campaign_overview, loops, prepared_history, spectra_before_and_after
 from mrpipe.reporting.structure_tracing import storey_maps
@@ -92,3 +93,12 @@ def test_no_line_crosses_the_texts_of_the_ranking() -> None:
     assert all(line.get_zorder() < axis.patches[0].get_zorder() for line in axis.lines)
     outside = axis.texts[1]
     assert outside.get_bbox_patch() is not None and outside.get_zorder() > max(line.get_zorder() for line in axis.lines)
+
+
+def test_a_constant_drive_has_no_desired_force_and_numbers_have_the_same_digits() -> None:
+    history = History(TIME, MOTION, MOTION, SPEED, FORCE, 0.0 * FORCE, 0.0 * FORCE)
+    figure = last_cycles({"passive-on": history, "vd": history})
+    passive, active = figure.axes[1].lines[0], figure.axes[4].lines[0]
+    assert not np.any(np.isfinite(passive.get_ydata())) and np.all(np.isfinite(active.get_ydata()))
+    shapes = _texts(shapes_on_frame(np.eye(2), [1.0, 2.0], [0.003, 0.0024]))
+    assert "0.30 %" in shapes and "0.24 %" in shapes

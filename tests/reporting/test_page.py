@@ -6,11 +6,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from mrpipe.pipeline.parts import PartWriter, read_part
-from mrpipe.reporting.page import ReportStage, RunFacts, write_report
+from mrpipe.reporting.page import ReportStage, RunFacts, _table_html, write_report
 from mrpipe.reporting.style import figure_with_axes
 
 
@@ -115,3 +116,22 @@ def test_a_bar_in_the_name_of_a_campaign_keeps_the_row_of_its_stage_whole(
     (row,) = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("| identify-frame |")]
     assert len(re.findall(r"(?<!\\)\|", row)) == 4
     assert r"a\|b" in row
+
+
+@pytest.mark.golden
+def test_a_column_of_numbers_stands_right_with_its_heading_and_units_are_readable() -> None:
+    frame = pd.DataFrame(
+        {
+            "parameter": ["gain", "c0_b"],
+            "value": [0.5, np.nan],
+            "unit": ["1", "N*s/m/A"],
+            "at_bound": [False, True],
+            "test": ["3", "3a"],
+        }
+    )
+    text = _table_html(frame)
+    assert "<th class='number'>value</th>" in text and "<td class='number'>0.5000</td>" in text
+    assert "<td class='number'>-</td>" in text
+    # a name that is a number in one row only stands where the other names stand, and a ratio has no unit
+    assert "<td>3</td>" in text and "<td class='number'>1</td>" not in text and "<td>N s/m per A</td>" in text
+    assert "<td>no</td>" in text and "<td>yes</td>" in text

@@ -112,9 +112,7 @@ def tests() -> list[PreparedTest]:
 def traced(tests: list[PreparedTest]) -> Tracing:
     library = {name: damper_effects()[name] for name in ("accumulator",)}
     few = ("bouc-wen", "dahl")
-    options = TracingOptions(
-        base_forms=few, refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False, drive_unit="V"
-    )
+    options = TracingOptions(base_forms=few, refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False)
     return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1))
 
 

@@ -8,9 +8,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.columns import NUMERIC_IN_MATLAB, DataFile
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
+from mrpipe.errors import UserError
 
 _SPARSE = "MATLAB_sparse"
 """Attribute of a group that holds a sparse matrix of MATLAB 7.3; its value is the number of rows."""
@@ -22,6 +23,7 @@ UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
     """Return the datasets of an HDF5 file; each field of a compound dataset is one column."""
     names: list[str] = []
+    objects: dict[str, str] = {}
     units: dict[str, str] = {}
 
     def note(name: str, item: Any) -> None:
@@ -30,6 +32,8 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
         elif name.rpartition("/")[0] in names:
             return  # a part of a sparse matrix
         elif isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            if matlab and ("MATLAB_object_decode" in item.attrs or item.dtype.kind == "O"):
+                objects[name] = np.bytes_(item.attrs.get("MATLAB_class", b"object")).decode("utf-8", "replace")
             fields = item.dtype.names
             names.extend(f"{name}/{field}" for field in fields) if fields else names.append(name)
             if not fields and (unit := _unit(item.attrs)):
@@ -40,6 +44,8 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
         rate = handle.attrs.get("sampling_rate_hz")
 
     def fetch(name: str) -> Any:
+        if name in objects:
+            raise UserError(path, f"variable {name}", f"is a {objects[name]} of MATLAB", NUMERIC_IN_MATLAB)
         with h5py.File(path, "r") as handle:
             if name in handle and _SPARSE in handle[name].attrs:
                 return _sparse(path, handle[name])

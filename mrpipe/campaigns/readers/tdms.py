@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     The clock of a channel is that of its waveform properties (`wf_increment`); groups may have different clocks.
     """
     nptdms = optional("nptdms", "npTDMS", "tdms", path)
+    # a message of this package about a file that was cut off has several lines, and names no file
+    logging.getLogger("nptdms").setLevel(logging.ERROR)
     file = nptdms.TdmsFile.read_metadata(str(path))
     channels = {
         f"{group.name}/{channel.name}": channel
@@ -32,6 +35,10 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     }
     if not channels:
         raise UserError(path, "", "holds no channel with samples", "export the measurement again")
+    lengths = [{len(channel) for channel in group.channels() if len(channel)} for group in file.groups()]
+    if file.file_status.incomplete_final_segment and any(len(found) > 1 for found in lengths):
+        problem = "is cut off: its last segment is shorter than the file says, and its channels differ in length"
+        raise UserError(path, "", problem, "export the measurement again")
     names = list(channels)
     clocks = {name: clock for name, item in channels.items() if (clock := _clock(item))}
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.front.laws import UNCONTROLLED, History, LawRun
 from mrpipe.reporting.style import AFTER, COLOURS, MEASURED, MODEL, figure_with_axes, label
+from mrpipe.reporting.words import number, percent
 
 KIND_COLOURS = {"noise": "#999999", "after": AFTER, "before": MODEL, "network": COLOURS[2], "linear": COLOURS[7]}
 """Colour of each kind of model in the comparison of errors."""
@@ -59,7 +60,7 @@ def model_errors(rows: Sequence[tuple[str, float, str]]) -> Figure:
     axis.scatter(values, place, s=60, color=[KIND_COLOURS[row[2]] for row in rows], zorder=2)
     for y, value in zip(place, values, strict=True):
         ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-        axis.annotate(f"{value:.2g} %", (value, y), (8, 0), textcoords="offset points", va="center", fontsize=9,
+        axis.annotate(f"{number(value, 2)} %", (value, y), (8, 0), textcoords="offset points", va="center", fontsize=9,
                       bbox=ground)  # fmt: skip
     axis.set_yticks(place, [name for name, _, _ in rows], fontsize=9)
     axis.set_xscale("log")
@@ -188,7 +189,7 @@ def law_bars(runs: Sequence[LawRun]) -> Figure:
         colours = [COLOURS[7] if run.law.startswith("passive") else AFTER for run in shown]
         axis.barh(place, values, 0.66, color=colours)
         for y, value in zip(place, values, strict=True):
-            axis.text(value + 0.015 * max(values), y, f"{value:.3g}", va="center", fontsize=9)
+            axis.text(value + 0.015 * max(values), y, number(value), va="center", fontsize=9)
         axis.set_yticks(place, [run.law for run in shown] if axis is axes[0, 0] else [""] * len(shown), fontsize=9)
         axis.set_xlim(0.0, 1.2 * max(values))
         axis.grid(axis="y", visible=False)
@@ -202,9 +203,11 @@ def last_cycles(histories: Mapping[str, History]) -> Figure:
     figure, axes = figure_with_axes(len(histories), 3, width=7.6, height=1.5)
     for row, (law, history) in enumerate(histories.items()):
         axes[row, 0].plot(history.time_s, 1e3 * history.top_m, color=AFTER, lw=1.0)
-        axes[row, 1].plot(history.time_s, history.desired_n, color=MODEL, lw=1.0, ls="--", label="desired")
+        # a constant drive follows no desired force
+        desired = np.full_like(history.desired_n, np.nan) if law.startswith("passive") else history.desired_n
+        axes[row, 1].plot(history.time_s, desired, color=MODEL, lw=1.0, ls="--", label="desired")
         axes[row, 1].plot(history.time_s, history.force_n, color=AFTER, lw=1.0, label="obtained")
-        axes[row, 2].plot(1e3 * history.stroke_m, history.desired_n, color=MODEL, lw=1.0, ls="--")
+        axes[row, 2].plot(1e3 * history.stroke_m, desired, color=MODEL, lw=1.0, ls="--")
         axes[row, 2].plot(1e3 * history.stroke_m, history.force_n, color=AFTER, lw=1.0)
         last = row == len(histories) - 1
         label(axes[row, 0], "time [s]" if last else "", "top [mm]", law)
@@ -260,9 +263,7 @@ def shapes_on_frame(shapes: FloatArray, frequencies_hz: Sequence[float], damping
         axis.plot([-0.8, 0.8], [0.0, 0.0], color="k", lw=1.2)
         axis.set_xlim(-1.05, 1.05)
         axis.set_axis_off()
-        axis.set_title(
-            f"mode {mode + 1}\n{frequencies_hz[mode]:.3g} Hz\n{100.0 * damping_ratios[mode]:.2g} %", fontsize=9
-        )
+        axis.set_title(f"mode {mode + 1}\n{frequencies_hz[mode]:.3g} Hz\n{percent(damping_ratios[mode])}", fontsize=9)
     return figure
 
 

@@ -124,8 +124,8 @@ def damper(facts: RunFacts) -> Section:
         section.figure(
             "loops",
             figures.loops(shown),
-            "Validation tests: the one that gains most, one with a middling error, and the one with the largest error "
-            "after. The models run freely, without the measured force.",
+            "Validation tests: the largest improvement, a medium error, the largest error after; a test may be two of "
+            "these. The models run freely, without the measured force.",
         )
     artifact = facts.artifact("close-loop.h5")
     if artifact is not None and "validation" in artifact.members("/"):
@@ -211,7 +211,7 @@ def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]
 
 
 def _shown_tests(facts: RunFacts) -> list[TestRun]:
-    """Return the validation tests to draw: gains most, middling error, largest error after; about two cycles each."""
+    """Return the validation tests to draw: largest improvement, medium error, largest error after; two cycles each."""
     artifact, loop = facts.artifact("close-loop.h5"), facts.summary("close-loop")
     if artifact is None or not loop.get("tests") or "names" not in artifact.members("validation"):
         return []
@@ -363,8 +363,7 @@ def next_steps(facts: RunFacts) -> Section:
     """Return what to test and to repair next, and which files to use."""
     section = Section("next", "Next steps")
     loop = facts.summary("close-loop")
-    text = statements.next_tests(facts)
-    if text:
+    if text := statements.next_tests(facts):
         section.text(text)
     wanted = loop.get("next_tests") or {}
     if wanted.get("tests"):
@@ -382,8 +381,10 @@ def next_steps(facts: RunFacts) -> Section:
             f"Faults of sensors were found. `mrpipe run --settings {loop['corrections']['file']}` removes them from "
             "the recordings and repeats the analysis."
         )
-    files = [(file, use) for file, use in _FILES if (facts.directory / file).exists()]
-    section.points([f"`{file}`: {use}" for file, use in files])
+    files = [f"`{file}`: {use}" for file, use in _FILES if (facts.directory / file).exists()]
+    if files:
+        section.text("Files of the run for further work:")
+        section.points(files)
     return section
 
 

@@ -71,7 +71,8 @@ def parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
                 "note": "at its bound" if entry.get("at_bound") else "",
             }
         )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    return table if rows and any(table["note"]) else table.drop(columns="note", errors="ignore")
 
 
 def traced_parameters(model: DamperModel) -> pd.DataFrame:

@@ -69,7 +69,7 @@ def trace_campaign(
     declared
         Effects that the campaign declares: part of the baseline.
     options
-        Options of the tracing.
+        Options of the tracing. The unit of the drive is that of the tests.
     known
         Base forms as `identify-damper` fitted them to the same tests; the search of each starts from them. A form that
         is not among them starts from the starts of the library.
@@ -80,6 +80,7 @@ def trace_campaign(
     progress
         Called with the share of the work that is done (0 to 1) and a text.
     """
+    options = options.changed(drive_unit=next((test.drive_unit for test in tests if test.drive_unit), "A"))
     rules = options.rules
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))

@@ -52,10 +52,11 @@ OFF = 0.33
 
 def plant_chain(found: Fit) -> Chain:
     """Return the chain for the closed loop, without faults of sensors and without a lag that no test determines."""
-    return traced_damper(found).chain()
+    # a chain holds numbers in SI and no units
+    return traced_damper(found, "drive").chain()
 
 
-def traced_damper(found: Fit, drive_unit: str = "A", *, effect_files: Mapping[str, str] | None = None) -> DamperModel:
+def traced_damper(found: Fit, drive_unit: str, *, effect_files: Mapping[str, str] | None = None) -> DamperModel:
     """Return the damper of a fit with its effects; a lag that no test determines is left out.
 
     Parameters

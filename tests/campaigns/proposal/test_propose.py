@@ -430,3 +430,21 @@ def test_a_file_of_two_rows_is_called_that(tmp_path: Path) -> None:
     (folder / "short.csv").write_text("t;x\n0,0;0,1\n1,0;0,2\n")
     found, _ = _proposed(folder, tmp_path / "beside")
     assert any(line.startswith("short.csv: has 2 rows only") for line in found.skipped)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(("travel", "drive_unit"), [("x [mm]", "V"), ("u [mm]", "A")])
+def test_the_letter_u_is_a_voltage_where_another_column_is_the_displacement(
+    tmp_path: Path, travel: str, drive_unit: str
+) -> None:
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    drive = "u" if drive_unit == "V" else "i [A]"
+    for index, test in enumerate(sound_tests(4, seed=1)):
+        rows = np.column_stack([test.time_s, 1e3 * test.displacement_m, test.drive, test.force_n])[:2000]
+        header = f"t [s],{travel},{drive},F [N]"
+        np.savetxt(folder / f"t{index}.csv", rows, delimiter=",", header=header, comments="", fmt="%.6f")
+    _, beside = _proposed(folder, tmp_path / "own")
+    channels = yaml.safe_load((beside / "campaign.yaml").read_text(encoding="utf-8"))["channels"]
+    assert (channels["drive"]["column"], channels["drive"]["unit"]) == (drive, drive_unit)
+    assert channels["displacement"]["column"] == travel

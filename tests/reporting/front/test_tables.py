@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.reporting.front.tables import effects, rivals, wanted_tests
-from mrpipe.reporting.traced_words import determined
+from mrpipe.reporting.front.tables import effects, parameters, rivals, wanted_tests
+from mrpipe.reporting.traced_words import determined, shown_candidates
 
 pytestmark = pytest.mark.property
 
@@ -55,6 +55,8 @@ def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: s
             {"name": "accumulator", "share": 0.997, "nrmse": 0.008, "forms": {"linear": 0.95}},
         ],
     }
+    shares = [item["share"] for item in shown_candidates(loop)]
+    assert shares == ([0.998, 0.997] if taken == "bouc-wen" else [0.95, 0.1])
     table = rivals(loop)
     if taken == "bouc-wen":
         assert table["recovers of the recoverable residual [%]"].tolist() == ["99.8", "99.7"]
@@ -62,3 +64,12 @@ def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: s
         heading = "recovers of what the base form dahl-stiffness leaves above the noise [%]"
         assert table["effect"].tolist() == ["accumulator", "stribeck"]
         assert table[heading].tolist() == ["95.0", "10.0"]
+
+
+@pytest.mark.golden
+def test_a_column_of_notes_is_there_only_where_there_is_a_note() -> None:
+    free = {"eta": {"value": 96.7, "standard_error": 0.5, "unit": "1/s"}}
+    assert "note" not in parameters(free)
+    bound = {"eta": {**free["eta"], "at_bound": True}}
+    assert list(parameters(bound)["note"]) == ["at its bound"]
+    assert parameters({}).empty

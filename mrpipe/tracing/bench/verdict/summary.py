@@ -82,7 +82,7 @@ class Tracing:
     states: States
     score_before: Score
     score_after: Score
-    drive_unit: str = "A"
+    drive_unit: str
 
 
 @dataclass(frozen=True)
