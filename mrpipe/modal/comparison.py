@@ -112,4 +112,4 @@ def _verified(
     """Simulate a forced test with the identified frame; `positions`: positions of the sensors on rigid floors."""
     if positions is None:
         return verify_in_time(frame, test, band_hz)
-    return compare_in_time(rigid_response(frame, test, positions), test, band_hz)
+    return compare_in_time(rigid_response(frame, test, positions, band_hz[1]), test, band_hz)

@@ -14,7 +14,7 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray
 from mrpipe.structures import Frame, frequency_response
-from mrpipe.structures.response import linear_response
+from mrpipe.structures.response import band_limited_response, linear_response
 
 _FILTER_ORDER = 3
 
@@ -66,7 +66,8 @@ def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) 
     flags = np.asarray(test.is_displacement)
     simulated = np.zeros(test.responses.shape)
     for place, values in test.inputs.items():
-        response = linear_response(frame, values - values.mean(), 1.0 / rate, shaker_floor=place.floor)
+        values = values - values.mean()
+        response = band_limited_response(frame, values, 1.0 / rate, band_hz[1], shaker_floor=place.floor)
         simulated += np.where(flags, response.displacement[:, rows], response.absolute_acceleration[:, rows])
     if test.is_part:
         simulated = simulated + _first_motion(frame, test, simulated, _band_pass(band_hz, rate))

@@ -29,6 +29,42 @@ class LinearResponse:
     absolute_acceleration: FloatArray
 
 
+_STEPS_IN_A_PERIOD = 33.0
+"""Steps in a period of the highest frequency; straight lines between them are 0.3 % too small at this frequency."""
+_MOST_VALUES = 4e7
+"""Largest number of values of a simulated history."""
+
+
+def band_limited_response(
+    frame: Frame,
+    excitation: FloatArray,
+    dt: float,
+    highest_hz: float,
+    *,
+    shaker_floor: int = 0,
+    force_position: FloatArray | None = None,
+) -> LinearResponse:
+    """Return the response from rest to an excitation that has no frequencies above half the sampling rate.
+
+    A measured excitation is such a signal. A straight line between its samples is too small by the factor
+    sinc^2(f dt), which is 0.81 at a quarter of the sampling rate. The excitation is therefore interpolated with a
+    low-pass filter to shorter steps before the simulation.
+
+    Parameters
+    ----------
+    frame, excitation, dt, shaker_floor, force_position
+        As for :func:`linear_response`.
+    highest_hz
+        Highest frequency of interest [Hz]; there the remaining error is 0.3 %.
+    """
+    most = max(1, int(_MOST_VALUES / max(excitation.size * 2 * frame.floors, 1)))
+    parts = min(max(1, int(np.ceil(_STEPS_IN_A_PERIOD * highest_hz * dt))), most)
+    fine = excitation if parts == 1 else signal.resample_poly(excitation, parts, 1)
+    found = linear_response(frame, fine, dt / parts, shaker_floor=shaker_floor, force_position=force_position)
+    histories = (found.displacement, found.velocity, found.absolute_acceleration)
+    return LinearResponse(*(item[::parts] for item in histories))
+
+
 def linear_response(
     frame: Frame,
     excitation: FloatArray,

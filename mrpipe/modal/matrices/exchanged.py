@@ -5,6 +5,8 @@ oscillation matrices; the same holds for a beam in bending). Exchanged sensors g
 changes. Such shapes can be orthogonal and predict the response well, because they are those of a structure whose
 springs connect the floors in another order. Another order of the floors is therefore reported if it gives each mode the
 right number of sign changes, and if springs between neighbouring floors describe the modes significantly better in it.
+In the first mode of a chain of springs each floor also moves more than the floors below it. A wall in bending is no
+chain of springs: upside down it would be a slightly better one, but its first mode excludes this order.
 """
 
 from __future__ import annotations
@@ -53,6 +55,7 @@ def exchanged_floors(
     else:
         tried = _orders(masses.size)
         possible = [order for order in tried if _is_possible(order, shapes, errors)]
+    possible = [order for order in possible if _grows(order, shapes[:, 0], errors[:, 0])]
     if not possible:
         return ()
     possible.sort(key=_moved)
@@ -94,6 +97,13 @@ def _is_possible(order: tuple[int, ...], shapes: FloatArray, errors: FloatArray)
         if not fewest <= mode <= most:
             return False
     return True
+
+
+def _grows(order: tuple[int, ...], shape: FloatArray, error: FloatArray) -> bool:
+    """Return whether the top may move more than the lowest floor in the first mode, if row `order[i]` is floor i."""
+    low, high = order[0], order[-1]
+    unsure = SURE_ERRORS * float(np.hypot(error[low], error[high]))
+    return bool(np.abs(shape[high]) + unsure > np.abs(shape[low]))
 
 
 def _swapped(rows: tuple[int, ...], pair: tuple[int, int]) -> tuple[int, ...]:

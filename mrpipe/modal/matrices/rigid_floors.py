@@ -19,7 +19,7 @@ from mrpipe.modal.matrices.assembly import Assembly
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search.checks import orthogonal_shapes
 from mrpipe.structures import Frame, modal_damping_matrix, normalise_to_largest
-from mrpipe.structures.response import linear_response
+from mrpipe.structures.response import band_limited_response
 
 AXES = ("x", "y", "rotation")
 _LARGEST_MISFIT = 0.1
@@ -73,7 +73,9 @@ def measured_rows(
     return rows
 
 
-def rigid_response(frame: Frame, test: FrameTest, positions: Mapping[str, tuple[float, float]]) -> FloatArray:
+def rigid_response(
+    frame: Frame, test: FrameTest, positions: Mapping[str, tuple[float, float]], highest_hz: float
+) -> FloatArray:
     """Return the simulated response of the sensors of a forced test, shape (m, s) [m/s2] or [m].
 
     Parameters
@@ -84,6 +86,8 @@ def rigid_response(frame: Frame, test: FrameTest, positions: Mapping[str, tuple[
         A test with a measured excitation of the ground or of shakers.
     positions
         Positions of the sensors, see :func:`measured_rows`.
+    highest_hz
+        Highest frequency of interest [Hz].
     """
     floors = frame.floors // 3
     rows = measured_rows([(sensor.floor, sensor.direction) for sensor in test.sensors], positions, floors)
@@ -92,7 +96,8 @@ def rigid_response(frame: Frame, test: FrameTest, positions: Mapping[str, tuple[
     for place, values in test.inputs.items():
         force = None if place.floor == 0 else measured_rows([place], positions, floors)[0]
         moved = replace(frame, influence=ground_influence(floors, place.direction)) if force is None else frame
-        found = linear_response(moved, values - values.mean(), 1.0 / test.sampling_rate_hz, force_position=force)
+        values, dt = values - values.mean(), 1.0 / test.sampling_rate_hz
+        found = band_limited_response(moved, values, dt, highest_hz, force_position=force)
         simulated += np.where(flags, found.displacement @ rows.T, found.absolute_acceleration @ rows.T)
     return simulated
 

@@ -19,6 +19,7 @@ from mrpipe.modal.search.pursuit import hidden_poles
 from mrpipe.modal.search.selection import (
     LEAST_COHERENCE,
     Layout,
+    certainty,
     complete_set,
     contradicts,
     largest_set,
@@ -207,18 +208,27 @@ def find_modes(
 def _best_of_bands(
     found: Sequence[_Found], layout: Layout, source: Path, decays: Sequence[FrameTest]
 ) -> ModeSearch | None:
-    """Return the largest set of modes after the last fit, of equal ones the last one; None without modes.
+    """Return the largest set of modes after the last fit; None without modes.
 
     A pole at the end of a narrow band represents the modes beyond it, and the last fit moves it. The sets are therefore
-    compared after that fit.
+    compared after that fit. Of equally large sets of a chain of floors the last one is taken, because missing modes of
+    a chain are searched later and compete with those found. Other structures have no such search. Of their equally
+    large sets that is taken whose least certain mode is more certain: if a strong mode is missed, poles close to it
+    represent it together, and each of them is uncertain.
     """
     sets = [(largest_set(item.fit, layout), item) for item in reversed(found)]
     best: ModeSearch | None = None
     for chosen, item in sorted(sets, key=lambda pair: -len(pair[0])):
-        if chosen and (best is None or len(chosen) > len(best.numbers)):
+        rivals = best is None or len(chosen) + (not layout.is_chain) > len(best.numbers)
+        if chosen and rivals:
             search = _incomplete(item, chosen, layout, source, decays)
-            best = search if best is None or len(search.numbers) > len(best.numbers) else best
+            best = search if best is None or _rank(search, layout) > _rank(best, layout) else best
     return best
+
+
+def _rank(search: ModeSearch, layout: Layout) -> tuple[int, float]:
+    """Return the number of modes and, if the floors do not form a chain, the certainty of the least certain mode."""
+    return len(search.numbers), 0.0 if layout.is_chain else float(certainty(search.fit).min())
 
 
 def _incomplete(

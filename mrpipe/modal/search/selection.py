@@ -19,8 +19,11 @@ from mrpipe.modal.search.checks import modal_coupling, possible_sign_changes
 
 LEAST_COHERENCE = 0.5
 LARGEST_DAMPING = 0.1
+"""Largest damping ratio of a mode of usual damping."""
 LEAST_DAMPING = 2e-6
 _DIVERGED_DAMPING = 0.25
+_CERTAIN_HEAVY = 0.02
+"""Largest relative standard error of the damping ratio of a heavily damped mode."""
 _UNKNOWN_SHAPE = 0.35
 _LARGEST_IMAGINARY = 0.6
 _LARGEST_COUPLING = 0.15
@@ -88,9 +91,20 @@ def shape_errors(fit: MultiModeFit) -> FloatArray:
     return np.asarray(np.linalg.norm(fit.residue_errors, axis=0) / norm)
 
 
-def usable(fit: MultiModeFit) -> BoolArray:
-    """Return the poles that may be modes: plausible damping, coherent response, known shape."""
+def usable(fit: MultiModeFit, *, with_heavy: bool = False) -> BoolArray:
+    """Return the poles that may be modes: plausible damping, coherent response, known shape.
+
+    Parameters
+    ----------
+    fit
+        Poles and their shapes.
+    with_heavy
+        Whether a damping ratio may exceed :data:`LARGEST_DAMPING` where the data determine it well. A pole that only
+        describes noise or modes outside the band is heavily damped, too, but its damping is uncertain.
+    """
     inside = (fit.damping_ratios < LARGEST_DAMPING) & (fit.damping_ratios > LEAST_DAMPING)
+    if with_heavy:
+        inside |= (fit.damping_ratios < _DIVERGED_DAMPING) & (certainty(fit) > 1.0 / _CERTAIN_HEAVY)
     return np.asarray(inside & (fit.mode_coherence() >= LEAST_COHERENCE) & (shape_errors(fit) < _UNKNOWN_SHAPE))
 
 
@@ -145,11 +159,16 @@ def complete_set(fit: MultiModeFit, layout: Layout, *, resolved: bool = False) -
 
     The modes are the lowest poles of which each has one more sign change and that are orthogonal to the mass. The peak
     of a flexible support above the band has the shape of the highest mode, so the lowest possible choice is taken.
-    `resolved`: as for :func:`largest_set`.
+    Heavily damped poles are considered where the others give no complete set. `resolved`: as for :func:`largest_set`.
     """
     if not layout.is_chain:
         return ()
-    may = usable(fit)
+    found = _complete_of(fit, layout, usable(fit), resolved=resolved)
+    return found or _complete_of(fit, layout, usable(fit, with_heavy=True), resolved=resolved)
+
+
+def _complete_of(fit: MultiModeFit, layout: Layout, may: BoolArray, *, resolved: bool) -> tuple[int, ...]:
+    """Return one pole for each floor of a chain, of the poles that may be modes; empty if no such set exists."""
     ranges = sign_ranges(fit, layout)
     coupling, allowed, _ = couplings(fit, layout)
 
@@ -178,7 +197,7 @@ def contradicts(fit: MultiModeFit, layout: Layout) -> bool:
     """Return whether one of two modes of a final fit is spurious: their shapes are nearly equal, or one is unknown."""
     coupling, _, same = couplings(fit, layout)
     equal = np.abs(np.triu(coupling, 1)) >= same
-    return bool(not usable(fit).all() or (equal.any() and all_floors_measured(fit, layout)))
+    return bool(not usable(fit, with_heavy=True).all() or (equal.any() and all_floors_measured(fit, layout)))
 
 
 def _numbered(
@@ -225,9 +244,19 @@ def largest_set(
 
     Of several largest sets that with the largest `size`, shape (r,), is taken; default: the strength of the poles. If
     the poles are known to be `resolved` from each other, those of equal shape count as two, unless the floor masses
-    contradict this.
+    contradict this. Heavily damped poles are considered where modes are missing.
     """
-    may = usable(fit)
+    numbered = _largest_of(fit, layout, usable(fit), size, resolved=resolved)
+    if len(numbered) >= layout.floors:
+        return numbered
+    more = _largest_of(fit, layout, usable(fit, with_heavy=True), size, resolved=resolved)
+    return more if len(more) > len(numbered) else numbered
+
+
+def _largest_of(
+    fit: MultiModeFit, layout: Layout, may: BoolArray, size: FloatArray | None, *, resolved: bool
+) -> dict[int, int]:
+    """Return pole -> mode number for the largest set of the poles that may be modes; see :func:`largest_set`."""
     poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]], resolved=resolved)
     if not layout.is_chain:
         return {pole: number for number, pole in enumerate(poles, start=1)}

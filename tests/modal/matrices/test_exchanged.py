@@ -51,6 +51,27 @@ def test_two_exchanged_sensors_of_a_high_tower_are_found() -> None:
     assert exchanged_floors(masses, shapes[rows], errors[rows], omega) == (1, 2, 6, 4, 5, 3, 7, 8)
 
 
+def _wall(floors: int) -> FloatArray:
+    """Return the stiffness of a wall in bending with equal storeys, from its flexibility [N/m]."""
+    height = np.arange(1, floors + 1) * 3.0
+    low, high = np.minimum.outer(height, height), np.maximum.outer(height, height)
+    return np.asarray(np.linalg.inv(low**2 * (3.0 * high - low) / (6.0 * 2e9)))
+
+
+@pytest.mark.parametrize("floors", [4, 5, 6])
+def test_a_wall_in_bending_is_not_upside_down(floors: int) -> None:
+    masses = 25e3 * np.linspace(1.1, 0.9, floors)
+    modes = natural_modes(Frame(np.diag(masses), np.zeros((floors, floors)), _wall(floors)))
+    shapes, errors = modes.mode_shapes, 1e-4 * np.ones((floors, floors))
+    assert exchanged_floors(masses, shapes, errors, modes.angular_frequencies) == ()
+
+
+def test_floors_numbered_from_the_top_are_named() -> None:
+    masses, shapes, errors, omega = _modes(3, 5)
+    rows = [4, 3, 2, 1, 0]
+    assert exchanged_floors(masses[rows], shapes[rows], errors[rows], omega) == (5, 4, 3, 2, 1)
+
+
 def test_the_sentence_names_the_floors() -> None:
     assert exchanged_finding((1, 3, 2, 4)).startswith("the sensors of floors 2 and 3 may be exchanged")
     assert "from the top" in exchanged_finding((3, 2, 1))

@@ -120,7 +120,7 @@ def test_a_frame_with_torsion_is_simulated_under_a_shaker_and_a_moving_ground(di
         "b", "random", 4 * rate, ground - ground.mean(), moved, (False,) * 6, 0, direction=direction, places=places
     )
     for each in (test, base):
-        found = compare_in_time(rigid_response(frame, each, POSITIONS), each, (0.3, 8.0))
+        found = compare_in_time(rigid_response(frame, each, POSITIONS, 8.0), each, (0.3, 8.0))
         assert found.fit_percent.min() > 98.0
 
 
