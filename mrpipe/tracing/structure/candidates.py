@@ -59,12 +59,15 @@ class Placed:
     effect, form
         The effect, and the form of it.
     floor
-        Floor on which it acts, from 1; 0 for an effect that acts on all storeys or on the base.
+        Floor on which it acts, from 1; 0 for an effect that acts on storeys or on the base.
+    storeys
+        Storeys on which an effect of storeys acts, from 1; empty if it may act on all of them.
     """
 
     effect: StructuralEffect
     form: StructuralForm
     floor: int = 0
+    storeys: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,13 @@ def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histo
         # storeys of equal height: the rotation of the base changes the drift of each by the same amount
         return Histories(turns, np.arange(kinds), np.tile(about.storey_stiffness, (kinds, 1)))
     drift, drift_rate = motion.drift, motion.drift_rate
-    forces = [unit_forces(form, drift[storey], drift_rate[storey], dt, fitted.numbers) for storey in range(n)]
-    return Histories(np.concatenate(forces, axis=1), np.arange(kinds * n), -np.repeat(np.eye(n), kinds, axis=0))
+    acting = [storey - 1 for storey in fitted.placed.storeys] or list(range(n))
+    forces = [unit_forces(form, drift[storey], drift_rate[storey], dt, fitted.numbers) for storey in acting]
+    # each storey has its amplitudes, also those on which the effect does not act
+    which, on_storey = np.zeros((n, kinds), dtype=np.int64), np.zeros((n, kinds, n))
+    which[acting] = np.arange(kinds * len(acting)).reshape(-1, kinds)
+    on_storey[acting, :, acting] = -1.0
+    return Histories(np.concatenate(forces, axis=1), which.ravel(), on_storey.reshape(-1, n))
 
 
 def columns_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Columns:

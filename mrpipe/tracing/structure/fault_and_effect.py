@@ -20,6 +20,7 @@ from mrpipe.tracing.structure.fault_search import likely_fault, with_smaller_res
 from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.model import model_of
+from mrpipe.tracing.structure.naming import acting_on, by_effect
 from mrpipe.tracing.structure.rounds import FrameSelection
 from mrpipe.tracing.structure.scores import frame_score
 from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
@@ -65,7 +66,9 @@ class FaultAndEffect:
         most = rules.probability_of_several
         effects = [{**item, "confidence": min(item["confidence"], most)} for item in summary["effects"]]
         names = listed([f"{item['name']} ({item['place']})" for item in effects])
-        sentence = f"{names}: explains what a fault of a sensor leaves ({self.fault.sentence()}); correct the channel"
+        most_of = "most of " if self.selection.groups.material(self.selection.residual) else ""
+        leaves = f"what a fault of a sensor leaves ({self.fault.sentence()})"
+        sentence = f"{names}: explains {most_of}{leaves}; correct the channel"
         if differing := [item["name"] for item in summary["frame"]["differing_tests"]]:
             sentence += f"; the error of {listed(differing)} exceeds the noise nevertheless"
         tests = [{**item, "nrmse_before": self.recorded.by_test[item["name"]]} for item in summary["tests"]]
@@ -157,11 +160,36 @@ def effect_after(
         Selection of effects on a problem.
     """
     again, found = _traced(problem, fault, choose)
-    if len(found.chosen) <= found.declared or found.share(found.residual) < rules.named_share:
+    if len(found.chosen) <= found.declared or not _sufficient(found, selection, rules):
         return None
     known = selection.chosen[: selection.declared]
     recorded = frame_score(model_of(selection.design, known, selection.about), problem.validation)
     return FaultAndEffect(fault, again, found, recorded)
+
+
+def _sufficient(found: FrameSelection, recorded: FrameSelection, rules: NamingRules) -> bool:
+    """Return whether effects explain what a fault leaves.
+
+    The fault of a sensor leaves a residual in all storeys that its floor is coupled to, an effect in those on which it
+    acts. If something is left in the latter alone, it is the form of the effect.
+
+    Parameters
+    ----------
+    found
+        Linear frame and effects on the corrected records.
+    recorded
+        Linear frame on the records as they were recorded.
+    rules
+        Rules for naming an effect.
+    """
+    share = found.share(found.residual)
+    if share >= rules.named_share:
+        return True
+    acting = {storey for item, own in by_effect(found, found.amplitudes) for storey in acting_on(item, own, found)}
+    others = [storey for storey in range(len(found.residual)) if storey not in acting]
+    explained = recorded.groups.of_storeys(others).material(recorded.design.residual)
+    left = found.groups.of_storeys(others).material(found.residual)
+    return share >= rules.least_share and explained and not left
 
 
 def _possible(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
@@ -48,6 +49,10 @@ class Groups:
     record: IntArray
     response: FloatArray
     rules: FrameRules = field(default_factory=FrameRules)
+
+    def of_storeys(self, storeys: Sequence[int]) -> Groups:
+        """Return the groups with only those of some storeys, from 0, flagged."""
+        return replace(self, flagged=self.flagged & np.isin(self.storey, storeys))
 
     def mean_square(self, residual: FloatArray) -> FloatArray:
         """Return the mean square of each group divided by that of the noise, shape (g,)."""

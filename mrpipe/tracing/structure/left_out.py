@@ -42,14 +42,21 @@ class Folds:
     records: tuple[tuple[Spectra, ...], ...]
     about: Surroundings
 
-    def errors(self, chosen: Sequence[Fitted]) -> FloatArray:
+    def errors(self, chosen: Sequence[Fitted], storey: int | None = None) -> FloatArray:
         """Return the weighted squared error of each group of lines of all left-out records.
 
         Shape parameters are kept; amplitudes and linear coefficients are fitted without the records of the part.
+
+        Parameters
+        ----------
+        chosen
+            Effects.
+        storey
+            Storey, from 0, whose errors are returned; None: all storeys.
         """
         found: list[FloatArray] = []
         for design, records in zip(self.designs, self.records, strict=True):
-            found.extend(left_out_errors(design, chosen, records, self.about))
+            found.extend(left_out_errors(design, chosen, records, self.about, storey))
         return np.concatenate(found)
 
     def error(self, chosen: Sequence[Fitted]) -> float:
@@ -82,13 +89,32 @@ def folds_of(base: Base, training: Sequence[Spectra], about: Surroundings) -> Fo
 
 
 def left_out_errors(
-    design: Design, chosen: Sequence[Fitted], records: Sequence[Spectra], about: Surroundings
+    design: Design,
+    chosen: Sequence[Fitted],
+    records: Sequence[Spectra],
+    about: Surroundings,
+    storey: int | None = None,
 ) -> list[FloatArray]:
-    """Return the weighted squared error of each group of lines, for records that were not used for the design."""
+    """Return the weighted squared error of each group of lines, for records that were not used for the design.
+
+    Parameters
+    ----------
+    design
+        Linear frame, fitted to other records.
+    chosen
+        Effects.
+    records
+        The records.
+    about
+        Scales of the structure.
+    storey
+        Storey, from 0, whose errors are returned; None: all storeys.
+    """
     model = model_of(design, chosen, about)
     errors = []
     for record in records:
         squares = np.abs((record.target - model.predict(record)) * record.weight) ** 2
+        squares = squares if storey is None else squares[storey : storey + 1]
         edges = np.arange(0, squares.shape[1], LINES_OF_A_GROUP)
         errors.append(np.add.reduceat(squares, edges, axis=1).ravel())
     return errors
@@ -113,10 +139,22 @@ def gains_of(
     if folds is None:
         return ()
     sums = [folds.errors(chosen[:k]) for k in range(declared, len(chosen) + 1)]
-    found = []
-    for before, after in itertools.pairwise(sums):
-        drawn = rng.integers(len(before), size=(draws, len(before)))
-        shares = 1.0 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), 1e-300)
-        low, high = np.quantile(shares, [0.025, 0.975])
-        found.append(Gain(float(1.0 - after.sum() / before.sum()), (float(low), float(high))))
-    return tuple(found)
+    return tuple(gain_between(before, after, rng, draws) for before, after in itertools.pairwise(sums))
+
+
+def gain_between(before: FloatArray, after: FloatArray, rng: np.random.Generator, draws: int) -> Gain:
+    """Return the share by which squared errors fall, with its interval.
+
+    Parameters
+    ----------
+    before, after
+        Squared errors of the same groups of lines, shape (g,) each.
+    rng
+        Source of randomness.
+    draws
+        Number of draws of the bootstrap.
+    """
+    drawn = rng.integers(len(before), size=(draws, len(before)))
+    shares = 1.0 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), 1e-300)
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return Gain(float(1.0 - after.sum() / before.sum()), (float(low), float(high)))

@@ -31,13 +31,10 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
     rules
         Rules for naming an effect.
     """
-    found, first = [], 0
+    found = []
     total = selection.share(selection.residual)
-    most = _most_probable(selection, total >= rules.named_share)
-    for place, item in enumerate(selection.chosen):
-        count = _amplitudes_of(item, len(selection.design.residual))
-        own = certain_amplitudes(item, after.amplitudes[first : first + count], selection)
-        first += count
+    for place, (item, own) in enumerate(by_effect(selection, after.amplitudes)):
+        most = _most_probable(selection, place, total >= rules.named_share)
         if place < selection.declared:
             continue
         candidates = selection.rounds[place - selection.declared]
@@ -65,14 +62,36 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
     return found
 
 
-def _most_probable(selection: FrameSelection, proven: bool) -> float:
-    """Return the probability of effects of this kind on planted campaigns, which the evidence does not exceed."""
+def _most_probable(selection: FrameSelection, place: int, proven: bool) -> float:
+    """Return the probability of effects of this kind on planted campaigns, which the evidence does not exceed.
+
+    An effect that acts on other storeys leaves the evidence for those before it as it is.
+    """
     frame = selection.rules
-    if len(selection.chosen) - selection.declared > 1:
+    alone = len(selection.chosen) - selection.elsewhere
+    if place >= alone or alone - selection.declared > 1:
         return frame.probability_of_several
     if selection.below_noise is not None:
         return frame.probability_below_noise
     return frame.probability_alone if proven else frame.probability_in_part
+
+
+def by_effect(selection: FrameSelection, amplitudes: FloatArray) -> list[tuple[Fitted, FloatArray]]:
+    """Return each chosen effect with those of its amplitudes that exceed the noise.
+
+    Parameters
+    ----------
+    selection
+        The chosen effects.
+    amplitudes
+        Their amplitudes, concatenated.
+    """
+    found, first = [], 0
+    for item in selection.chosen:
+        count = _amplitudes_of(item, len(selection.design.residual))
+        found.append((item, certain_amplitudes(item, amplitudes[first : first + count], selection)))
+        first += count
+    return found
 
 
 def certain_amplitudes(item: Fitted, amplitudes: FloatArray, selection: FrameSelection) -> FloatArray:
@@ -121,11 +140,45 @@ def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
         return f"floor {item.placed.floor}"
     if item.placed.effect.acts_on == "base":
         return "base"
-    by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
-    strong = np.flatnonzero(by_storey > acting * float(by_storey.max()))
-    if len(strong) == len(by_storey):
+    strong = strong_storeys(item, amplitudes, acting)
+    if len(strong) * len(item.placed.form.amplitudes) == len(amplitudes):
         return "every storey"
     return "storey " + ", ".join(str(k + 1) for k in strong)
+
+
+def strong_storeys(item: Fitted, amplitudes: FloatArray, acting: float) -> list[int]:
+    """Return the storeys, from 0, on which an effect of storeys acts with a large amplitude.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Amplitudes of the effect, storey after storey.
+    acting
+        Share of the largest amplitude from which on a storey counts.
+    """
+    by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
+    return [int(k) for k in np.flatnonzero(by_storey > acting * float(by_storey.max()))]
+
+
+def acting_on(item: Fitted, amplitudes: FloatArray, selection: FrameSelection) -> list[int]:
+    """Return the storeys, from 0, in whose equations the force of an effect is large.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    selection
+        Linear frame with the records.
+    """
+    if item.placed.effect.acts_on == "base":
+        return list(range(len(selection.design.residual)))
+    if item.placed.floor:
+        return list(range(item.placed.floor))
+    return strong_storeys(item, amplitudes, selection.rules.acting)
 
 
 def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, Estimate]:

@@ -52,6 +52,9 @@ class FrameRecord:
         Floors (from 1) without a sensor, whose acceleration was computed.
     turning
         Angular acceleration of every floor about the vertical, shape (m, n) [rad/s2], or (m, 0) if it is not known.
+    averages
+        Channel -> averaged spectra, from which its noise is estimated again for each band and colour. They are computed
+        when they are first needed; a changed record has none.
     """
 
     name: str
@@ -67,6 +70,7 @@ class FrameRecord:
     details: dict[str, Any] = field(default_factory=dict)
     computed: tuple[int, ...] = ()
     turning: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    averages: dict[tuple[str, int], Any] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     @property
     def turns(self) -> int:

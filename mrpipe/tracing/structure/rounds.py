@@ -100,6 +100,8 @@ class FrameSelection:
     below_noise
         Set if no group of lines exceeds the noise, but effects that act on all lines explain something; shares then
         refer to what they explain.
+    elsewhere
+        Number of the chosen effects, the last ones, that act on other storeys than those before them.
     """
 
     base: Base
@@ -115,6 +117,7 @@ class FrameSelection:
     storey_stiffness: FloatArray = field(default_factory=lambda: np.zeros(0))
     rules: FrameRules = field(default_factory=FrameRules)
     below_noise: BelowNoise | None = None
+    elsewhere: int = 0
 
     @property
     def about(self) -> Surroundings:

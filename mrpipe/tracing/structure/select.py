@@ -13,6 +13,7 @@ from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder
 from mrpipe.tracing.structure.below_noise import with_effect_below_noise
 from mrpipe.tracing.structure.candidates import Fitted, Placed, Surroundings
+from mrpipe.tracing.structure.elsewhere import with_effects_elsewhere
 from mrpipe.tracing.structure.fit import solve
 from mrpipe.tracing.structure.flexible import gain_beyond, projected_variants
 from mrpipe.tracing.structure.groups import groups_of
@@ -83,7 +84,11 @@ def select(
     found = needed_only(_forward(free, forms, folds, most, jobs, progress, rules), folds)
     if rocking is not None:
         found, folds = _better(found, folds, rocking, folds_of(rocking.base, problem.training, rocking.about))
-    return replace(found, gains=gains_of(folds, found.chosen, found.declared, rng, draws)) if found.chosen else found
+    if not found.chosen:
+        return found
+    found = replace(found, gains=gains_of(folds, found.chosen, found.declared, rng, draws))
+    more = with_effects_elsewhere(found, forms, folds, rules, most=most, rng=rng, draws=draws, jobs=jobs)
+    return replace(more, gains=gains_of(folds, more.chosen, more.declared, rng, draws)) if more.elsewhere else found
 
 
 def _below_noise(

@@ -25,6 +25,9 @@ from mrpipe.words import listed
 SURE = 3.0
 """Numerical technique: a value that differs from that of a sound sensor by more standard errors is mentioned."""
 
+LEAST_DELAY_S = 5e-5
+"""Numerical technique: a smaller delay is not mentioned; it turns lines at 50 Hz by less than a degree."""
+
 
 @dataclass(frozen=True)
 class SensorFault:
@@ -85,7 +88,7 @@ class SensorFault:
         gain = f"{self.gain:.3g}"
         if gain != "1" and abs(self.gain - 1.0) > SURE * self.gain_error:
             said.append(f"a gain of {gain}")
-        if abs(self.delay_s) > SURE * self.delay_error_s:
+        if abs(self.delay_s) > max(SURE * self.delay_error_s, LEAST_DELAY_S):
             said.append(f"a delay of {1e3 * self.delay_s:.2g} ms")
         text = f"{self.channel} has {listed(said)} {where}"
         mass = f", or the mass of floor {self.floor} is {self.gain:.3g} times the declared one"

@@ -116,16 +116,19 @@ def noise_density(
     colour
         Coefficient of the autoregressive process; the density is that of its innovations.
     """
+    return _quiet_density(_averages_of(values, rate_hz), above_hz, quietest, colour)
+
+
+def _quiet_density(averages: _Averages, above_hz: float, quietest: float | None, colour: float) -> float:
     quietest = FrameRules().quietest if quietest is None else quietest
-    whole = _density_above(values, rate_hz, above_hz, colour)
-    pieces = _pieces(values)
+    whole, pieces, rate_hz = averages.whole.level(above_hz, colour), averages.pieces, averages.whole.rate_hz
     if len(pieces) < FEWEST_PARTS:
         return whole
-    levels = sorted(_density_above(piece, rate_hz, above_hz, colour) for piece in pieces)
+    levels = sorted(piece.level(above_hz, colour) for piece in pieces)
     # expected distance of the second smallest level from the mean, in standard deviations (Blom); the deviation of a
     # level follows from its number of lines
     below = -float(stats.norm.ppf((2.0 - 0.375) / (len(pieces) + 0.25)))
-    inside = len(pieces[0]) * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
+    inside = pieces[0].samples * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
     quiet = levels[1] / (1.0 - below * min(0.7, np.sqrt(3.5 / inside)))
     return float(min(max(quiet, quietest * whole), whole))
 
@@ -164,7 +167,7 @@ def possible_colours(records: Sequence[FrameRecord], band_high_hz: float) -> tup
 def _costs(values: FloatArray, rate_hz: float, above_hz: float) -> tuple[FloatArray, float]:
     """Return negative logarithms of the likelihood of each colour, and the number of independent lines."""
     pieces = _pieces(values)
-    pieces.sort(key=lambda piece: _density_above(piece, rate_hz, above_hz))
+    pieces.sort(key=lambda piece: _average(piece, rate_hz).level(above_hz))
     # slip and impact cause vibration above the band in the louder parts
     quiet = pieces[: max(1, len(pieces) // 2)]
     length = min(_block(piece) for piece in quiet)
@@ -196,18 +199,25 @@ def noise_of(record: FrameRecord, band_high_hz: float, rules: FrameRules | None 
         Coefficient of the autoregressive process of the accelerometers' noise; 0: white.
     """
     above, rate, quietest = ABOVE_BAND * band_high_hz, record.rate_hz, (rules or FrameRules()).quietest
+
+    def density(kind: str, number: int, values: FloatArray, colour: float = 0.0) -> float:
+        key = (kind, number)
+        if key not in record.averages:
+            record.averages[key] = _averages_of(values, rate)
+        return _quiet_density(record.averages[key], above, quietest, colour)
+
     channels = (record.ground, *record.acceleration.T)
-    densities = np.array([noise_density(item, rate, above, quietest, colour) for item in channels])
+    densities = np.array([density("acceleration", k, item, colour) for k, item in enumerate(channels)])
     sensors = [floor for floor in range(1, densities.size) if floor not in record.computed]
     # above the band the computed motion of a floor vanishes, but in the band it contains the noise of its neighbours
     densities[list(record.computed)] = densities[sensors].max(initial=0.0)
     return Noise(
         densities,
-        {floor: noise_density(x, rate, above, quietest) for floor, x in record.measured_displacement.items()},
-        {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
+        {floor: density("displacement", floor, x) for floor, x in record.measured_displacement.items()},
+        {floor: density("load", floor, x) for floor, x in record.known_loads.items()},
         colour,
         rate,
-        np.array([noise_density(item, rate, above, quietest, colour) for item in record.turning.T]),
+        np.array([density("turning", k, item, colour) for k, item in enumerate(record.turning.T)]),
     )
 
 
@@ -223,15 +233,55 @@ def _above(frequencies: FloatArray, rate_hz: float, above_hz: float) -> BoolArra
     return (frequencies > min(above_hz, HIGHEST_START * rate_hz)) & (frequencies < HIGHEST * rate_hz)
 
 
-def _density_above(values: FloatArray, rate_hz: float, above_hz: float, colour: float = 0.0) -> float:
+@dataclass(frozen=True)
+class _Average:
+    """Averaged spectrum of a channel, or of a part of it.
+
+    Attributes
+    ----------
+    frequencies, density
+        Frequencies [Hz] and power density [unit^2/Hz], shape (f,).
+    rate_hz
+        Sampling rate [Hz].
+    samples
+        Number of samples.
+    quartile
+        Lower quartile of the density of white noise over its mean; it depends on the number of averaged blocks.
+    """
+
+    frequencies: FloatArray
+    density: FloatArray
+    rate_hz: float
+    samples: int
+    quartile: float
+
+    def level(self, above_hz: float, colour: float = 0.0) -> float:
+        """Return the density above a frequency, that of the innovations where the noise is coloured."""
+        high = _above(self.frequencies, self.rate_hz, above_hz)
+        # the lower quartile ignores resonances
+        shape = shape_of(colour, self.frequencies[high] / self.rate_hz)
+        return float(np.quantile(self.density[high] / shape, 0.25)) / self.quartile
+
+
+@dataclass(frozen=True)
+class _Averages:
+    """Averaged spectra of a channel and of its parts."""
+
+    whole: _Average
+    pieces: tuple[_Average, ...]
+
+
+def _averages_of(values: FloatArray, rate_hz: float) -> _Averages:
+    return _Averages(_average(values, rate_hz), tuple(_average(piece, rate_hz) for piece in _pieces(values)))
+
+
+def _average(values: FloatArray, rate_hz: float) -> _Average:
     length = _block(values)
     frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=length)
-    high = _above(frequencies, rate_hz, above_hz)
-    # the lower quartile ignores resonances; its ratio to the mean depends on the number of averaged blocks (half
-    # overlapping Hann windows have 1.06 times the variance of separate ones)
+    # half overlapping Hann windows have 1.06 times the variance of separate ones
     freedom = 2.0 * max(1.0, 2.0 * len(values) / length - 1.0) / 1.06
-    level = np.quantile(density[high] / shape_of(colour, frequencies[high] / rate_hz), 0.25)
-    return float(level) / float(stats.chi2.ppf(0.25, freedom) / freedom)
+    quartile = float(stats.chi2.ppf(0.25, freedom) / freedom)
+    return _Average(frequencies, density, rate_hz, len(values), quartile)
 
 
 def _whittle(density: FloatArray, shape: FloatArray) -> float:

@@ -13,7 +13,7 @@ from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import NamingRules
-from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.rules import FrameRules, ValidationRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.exchange import exchanged_floors
@@ -24,17 +24,17 @@ from mrpipe.tracing.structure.fault_and_effect import (
     leaves_nothing,
     promising_fault,
 )
+from mrpipe.tracing.structure.judgement import Errors, Judgement, why_unnamed
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
-from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests, in_words
+from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests
 from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.rounds import FrameCandidate, FrameSelection
 from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import select
 from mrpipe.tracing.structure.sensor_faults import SensorFault
 from mrpipe.tracing.structure.spectra import Spectra
-from mrpipe.tracing.verdict import Candidate, NamedEffect, Unexplained, Verdict
-from mrpipe.words import listed
+from mrpipe.tracing.verdict import Candidate, Unexplained, Verdict
 
 QUANTITY = (
     "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
@@ -43,9 +43,6 @@ QUANTITY = (
 
 LISTED = 6
 """Numerical technique: largest number of states that are listed under `depends_on`."""
-
-NO_GAIN = 1e-12
-"""Numerical technique: a smaller squared error counts as zero in a ratio."""
 
 FEWEST_PERIODS = 5
 """Numerical technique: a shorter record, in periods of the first mode, is refused."""
@@ -83,6 +80,7 @@ def trace_frame(
     declared: Sequence[StructuralEffect],
     rules: NamingRules,
     frame_rules: FrameRules | None = None,
+    validation_rules: ValidationRules | None = None,
     *,
     most: int = 3,
     draws: int = 400,
@@ -102,6 +100,8 @@ def trace_frame(
         Rules for naming an effect.
     frame_rules
         Thresholds for the residual of the frame; their defaults if None.
+    validation_rules
+        How the errors on validation tests decide the class of the verdict; their defaults if None.
     most
         Largest number of effects that are named together.
     draws
@@ -134,7 +134,10 @@ def trace_frame(
         # a faulty sensor in one test looks like a change of the stiffness
         between = replace(between, kind="constant", change=0.0, step_before="", storey=0)
     differing = differing_tests(after, problem, selection.groups.scale, problem.rules.differing_floors)
-    summary = _summary(problem, selection, before, after, between, declared, rules, found.reason, differing)
+    summary = _summary(
+        problem, selection, before, after, between, declared, rules, found.reason, differing,
+        validation_rules or ValidationRules(),
+    )  # fmt: skip
     if found.both:
         summary = found.both.in_summary(summary, problem.rules)
     elif found.fault:
@@ -187,7 +190,7 @@ def _diagnosis(
         return _Diagnosis(both.problem, both.selection, "", both.fault, both)
     if exchange:
         return _Diagnosis(problem, selection, exchange.reason(), exchange)
-    return _Diagnosis(problem, selection, _unnamed(selection, rules))
+    return _Diagnosis(problem, selection, why_unnamed(selection, rules, fault))
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:
@@ -207,26 +210,6 @@ def _in_order(problem: FrameProblem, data: FrameData) -> list[Spectra]:
     return [known[record.name] for record in data.records if record.name in known]
 
 
-def _unnamed(selection: FrameSelection, rules: NamingRules) -> str:
-    if not selection.structured:
-        return "the residual is noise: nothing is missing"
-    if selection.below_noise is not None and not selection.chosen:
-        return _undecided(selection.below_noise.alike)
-    if len(selection.chosen) <= selection.declared:
-        return "no effect of the library changes the error"
-    if selection.share(selection.residual) < rules.least_share:
-        return "no effect of the library recovers enough of what exceeds the noise"
-    return ""
-
-
-def _undecided(alike: Sequence[str]) -> str:
-    """Return why no effect is named for a residual that is smaller than the noise of each line."""
-    small = "something smaller than the noise of each spectral line depends on the motion"
-    if len(alike) > 1:
-        return f"{small}; {listed(alike)} explain it alike"
-    return f"{small}; {alike[0]} explains only part of it"
-
-
 def _summary(
     problem: FrameProblem,
     selection: FrameSelection,
@@ -237,15 +220,18 @@ def _summary(
     rules: NamingRules,
     reason: str,
     differing: Sequence[DifferingTest],
+    validation: ValidationRules,
 ) -> dict[str, Any]:
     first, last = frame_score(before, problem.validation), frame_score(after, problem.validation)
     named = [] if reason else named_effects(selection, after, rules)
-    share = selection.share(selection.residual) if named else 0.0
+    floor = noise_floor(problem.validation, selection.groups.scale)
+    errors = Errors(first.nrmse, last.nrmse, floor, _flexible(problem, selection, before, first.nrmse))
+    judgement = Judgement(selection, named, reason, errors, between, differing, rules, validation)
     return {
         "model": selection.base,
         "quantity": QUANTITY,
         "declared_effects": [item.name for item in declared],
-        "noise_floor_nrmse": noise_floor(problem.validation, selection.groups.scale),
+        "noise_floor_nrmse": floor,
         "noise_from": "accelerometers above the highest mode",
         "before": first.as_json(),
         "residual": _residual(selection, problem),
@@ -257,11 +243,11 @@ def _summary(
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
         "effects": [item.as_json() for item in named],
-        **_verdict(selection, named, share, rules, reason, between, differing).sentence_as_json(),
+        **judgement.verdict().sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
         "after": last.as_json(),
-        "ceiling": _ceiling(problem, selection, before, first.nrmse, last.nrmse),
-        "unexplained": _unexplained(problem, selection, after, rules, share if named else None).as_json(),
+        "ceiling": {"nrmse": errors.ceiling, "recovered": errors.recovered},
+        "unexplained": _unexplained(problem, after, judgement).as_json(),
         "tests": [
             {"name": name, "nrmse_before": value, "nrmse_after": last.by_test[name]}
             for name, value in first.by_test.items()
@@ -293,37 +279,27 @@ def _residual(selection: FrameSelection, problem: FrameProblem) -> dict[str, Any
     }
 
 
-def _ceiling(
-    problem: FrameProblem, selection: FrameSelection, before: FrameModel, nrmse_before: float, nrmse_after: float
-) -> dict[str, float]:
-    """Return the error of a flexible model, and the share of the error above it that the named effects remove."""
+def _flexible(problem: FrameProblem, selection: FrameSelection, before: FrameModel, nrmse_before: float) -> float:
+    """Return the NRMSE of the linear frame with a flexible model of the residual of the storeys that lack something."""
     lacking = [k for k, value in enumerate(_by_storey(selection)) if value > problem.rules.least_storey]
-    flexible = nrmse_before
-    if lacking:
-        period = 1.0 / float(problem.frequencies_hz[0])
-        flexible = flexible_score(before, problem.training, problem.validation, lacking, period)
-    best = min(flexible, nrmse_after)
-    gain = nrmse_before**2 - best**2
-    recovered = (nrmse_before**2 - nrmse_after**2) / gain if gain > NO_GAIN else 0.0
-    return {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))}
+    if not lacking:
+        return nrmse_before
+    period = 1.0 / float(problem.frequencies_hz[0])
+    return flexible_score(before, problem.training, problem.validation, lacking, period)
 
 
-def _unexplained(
-    problem: FrameProblem, selection: FrameSelection, after: FrameModel, rules: NamingRules, share: float | None
-) -> Unexplained:
-    """Return the part of the residual that the named effects leave; `share` is what they explain, None without any."""
-    explained = share or 0.0
+def _unexplained(problem: FrameProblem, after: FrameModel, judgement: Judgement) -> Unexplained:
+    """Return the part of the residual that the named effects leave."""
+    selection = judgement.selection
+    left = selection.residual if judgement.named else selection.design.residual
     still = (
         selection.structured
-        and explained < rules.named_share
-        and (
-            selection.below_noise is not None
-            or selection.groups.material(selection.design.residual if share is None else selection.residual)
-        )
+        and not judgement.proven
+        and (selection.below_noise is not None or selection.groups.material(left))
     )
     return Unexplained(
         bool(still),
-        float(np.clip(1.0 - explained, 0.0, 1.0)) if selection.structured else 0.0,
+        float(np.clip(1.0 - judgement.share, 0.0, 1.0)) if selection.structured else 0.0,
         _depends_on(after, problem, _worst_storey(selection)) if still else (),
     )
 
@@ -371,29 +347,3 @@ def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProbl
         item.forms,
         tuple(fitted.at_bound),
     )
-
-
-def _verdict(
-    selection: FrameSelection,
-    named: Sequence[NamedEffect],
-    share: float,
-    rules: NamingRules,
-    reason: str,
-    between: StiffnessBetweenTests,
-    differing: Sequence[DifferingTest],
-) -> Verdict:
-    # if the stiffness changed between tests, the residual also contains this change, which no effect explains
-    drift = f"; {between.sentence()}" if between.drifts else ""
-    if differing and not selection.structured:
-        return Verdict("validation differs", f"the training tests lack nothing, but {in_words(differing)}{drift}")
-    if reason:
-        return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
-    names = listed([f"{item.name} ({item.place})" for item in named])
-    if differing:
-        form = f"explains what the training tests lack, but {in_words(differing)}"
-        return Verdict("partly explained", f"{names}: {form}{drift}", share)
-    if share >= rules.named_share:
-        small = ", which is smaller than the noise of each spectral line" if selection.below_noise is not None else ""
-        return Verdict("explained", f"{names}: explains what is missing{small}{drift}", share)
-    form = "explains part of what is missing; its form is not proven"
-    return Verdict("partly explained", f"{names}: {form}{drift}", share)

@@ -110,7 +110,7 @@ def trace_structure(
         if all(item.role == "validation" for item in data.records):
             continue
         frame = trace_frame(
-            data, library, declared, options, rules.frame, most=options.most_effects,
+            data, library, declared, options, rules.frame, rules.validation, most=options.most_effects,
             draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
         frames[axis] = frame

@@ -40,6 +40,8 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
             h = z[6 + s]
             out[6 + s] = (r - 0.5 * abs(r) * abs(h) * h - 0.5 * r * h * h) / 2e-3
             total += 2.0 * h if s == 1 else 0.0
+        elif code == 10:
+            total += 1.2e7 * d**3 if s == 2 else 0.0
         elif code == 8:
             # damping that grows with the square of the drift
             total += 2.0e6 * d * d * r if s == 1 else 0.0
@@ -49,7 +51,7 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
         force[s] = total
     for s in range(3):
         load = force[s + 1] - force[s]
-        if code == 3 and s == 1 and x[s] > 0.004:
+        if code in (3, 10) and s == 1 and x[s] > 0.004:
             load -= 3.0e4 * (x[s] - 0.004) + 30.0 * max(v[s], 0.0)
         if code == 7 and s != 1:
             # a brace between the floors 1 and 3, so that the stiffness is not tri-diagonal
@@ -92,6 +94,7 @@ CODES = {
     "braced-rocking": 7,
     "nonlinear-damping": 8,
     "yielding": 9,
+    "impact and cubic-stiffness": 10,
 }
 
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from mrpipe.effects.structural.library import all_structural_effects
-from mrpipe.tracing.options import TracingOptions
-from mrpipe.tracing.structure.fault_and_effect import without_effects
+from mrpipe.tracing.options import NamingRules, TracingOptions
+from mrpipe.tracing.structure.fault_and_effect import _sufficient, without_effects
 from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.groups import groups_of
+from mrpipe.tracing.structure.judgement import why_unnamed
 from mrpipe.tracing.structure.records import frame_data
+from mrpipe.tracing.structure.rounds import FrameSelection
+from mrpipe.tracing.structure.sensor_faults import SensorFault
 from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
 from tests.tracing.structure.test_sensor_faults import faulty_campaign
 
@@ -56,3 +61,31 @@ def test_the_force_of_an_effect_is_subtracted() -> None:
     found = _traced("none", "cubic-stiffness")
     rest = design_of(found.selection.base, without_effects(found.problem.training, found.selection))
     np.testing.assert_allclose(np.mean(rest.residual**2), np.mean(found.selection.residual**2), rtol=1e-3)
+
+
+def test_what_an_effect_leaves_where_it_acts_is_its_form() -> None:
+    """The fault leaves a residual in all storeys, and the effect explains only a part of that of storey 2."""
+    found = _traced("gain", "cubic-stiffness")
+    design = design_of("linear-frame", _traced("gain", "clean").problem.training)
+    recorded = FrameSelection("linear-frame", design, groups_of(design), {})
+    strict = NamingRules(named_share=1.0)
+    part = replace(found.selection, residual=found.selection.residual.copy())
+    part.residual[1] += 0.3 * (found.selection.design.residual[1] - part.residual[1])
+    assert strict.least_share < part.share(part.residual) < strict.named_share
+    assert _sufficient(part, recorded, strict)
+    # without a fault, the other storeys have no residual that correcting a sensor would explain
+    assert not _sufficient(part, found.selection, strict)
+    flagged = replace(part.groups, flagged=np.ones_like(part.groups.flagged))
+    elsewhere = replace(part, residual=part.residual.copy(), groups=flagged)
+    elsewhere.residual[2] *= 5.0
+    assert elsewhere.share(elsewhere.residual) > strict.least_share
+    assert not _sufficient(elsewhere, recorded, strict)
+
+
+def test_no_effect_is_named_if_a_fault_explains_more() -> None:
+    selection = _traced("none", "cubic-stiffness").selection
+    share = selection.share(selection.residual)
+    more, less = (SensorFault(1, gain=1.2, gain_error=0.01, explained=share + change) for change in (0.01, -0.01))
+    assert why_unnamed(selection, NamingRules()) == why_unnamed(selection, NamingRules(), less) == ""
+    said = why_unnamed(selection, NamingRules(), more)
+    assert "floor_acceleration_1 has a gain of 1.2 in all tests" in said and "cubic-stiffness" in said

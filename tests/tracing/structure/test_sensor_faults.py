@@ -24,9 +24,13 @@ pytestmark = pytest.mark.planted
 DELAY_S = 0.004
 
 
-def _late(values: FloatArray) -> FloatArray:
-    """Return a history that is late by a few milliseconds, interpolated by the Fourier transform."""
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(values), 1.0 / RATE) * DELAY_S)
+LONG_DELAY_S = 0.03
+"""Nearly half a period of the fastest lines, so that the residual first rises with a delay that is fitted from zero."""
+
+
+def _late(values: FloatArray, delay_s: float = DELAY_S) -> FloatArray:
+    """Return a history that is late by some milliseconds, interpolated by the Fourier transform."""
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(values), 1.0 / RATE) * delay_s)
     return np.asarray(np.fft.irfft(np.fft.rfft(values) * turn, len(values)))
 
 
@@ -39,6 +43,8 @@ def _spoilt(recording: Recording, fault: str) -> Recording:
         channels["floor_acceleration_3"] = -third
     elif fault == "delay":
         channels["floor_acceleration_3"] = _late(third)
+    elif fault == "long delay":
+        channels["floor_acceleration_3"] = _late(third, LONG_DELAY_S)
     elif fault == "gain of the ground":
         channels["ground_acceleration"] = 1.2 * channels["ground_acceleration"]
     elif fault == "exchanged in all tests" or (fault == "exchanged" and recording.name == "sweep-1"):
@@ -76,6 +82,7 @@ def _found(problem: FrameProblem) -> SensorFault | None:
         ("gain", 3, "", 0.85, 0.0),
         ("sign in one test", 3, "sweep-1", -1.0, 0.0),
         ("delay", 3, "", 1.0, DELAY_S),
+        ("long delay", 3, "", 1.0, LONG_DELAY_S),
         ("gain of the ground", 0, "", 1.2, 0.0),
     ],
 )
@@ -137,6 +144,11 @@ def test_a_fault_within_the_error_of_a_calibration_does_not_count() -> None:
 def test_a_gain_in_all_tests_may_be_a_wrong_mass() -> None:
     assert "or the mass of floor 2 is 0.8 times the declared one" in SensorFault(2, gain=0.8).sentence()
     assert "mass" not in SensorFault(2, "sweep-1", 0.8).sentence()
+
+
+def test_a_delay_that_no_structure_shows_is_not_mentioned() -> None:
+    assert "delay" not in SensorFault(2, gain=0.8, gain_error=1e-3, delay_s=1e-5, delay_error_s=1e-6).sentence()
+    assert "a gain of 0.8 and a delay of 4 ms" in SensorFault(2, gain=0.8, delay_s=0.004).sentence()
 
 
 def test_the_record_of_another_test_is_not_repaired() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -10,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem, ladder
 from mrpipe.tracing.structure.records import FrameRecord
-from mrpipe.tracing.structure.sensor_noise import Noise, possible_colours, shape_of
+from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, possible_colours, shape_of
 
 RATE = 200.0
 MASSES = np.full(3, 5.0)
@@ -92,3 +94,17 @@ def test_density_of_an_autoregressive_process() -> None:
         Noise(np.array([2.0, 4.0]), {}, colour=0.7, rate_hz=1.0).of_accelerometers(frequencies[inside]),
         np.stack([expected, 2.0 * expected]),
     )
+
+
+@pytest.mark.property
+def test_spectra_of_a_channel_are_computed_once_and_not_for_a_changed_record() -> None:
+    first = record("a", np.random.default_rng(3))
+    noises = [noise_of(first, HIGH_HZ, colour=colour) for colour in (0.0, 0.5)]
+    kept = dict(first.averages)
+    assert len(kept) == 4
+    again = noise_of(replace(first), HIGH_HZ, colour=0.5)
+    np.testing.assert_array_equal(noises[1].acceleration, again.acceleration)
+    assert all(first.averages[key] is item for key, item in kept.items())
+    louder = replace(first, acceleration=2.0 * first.acceleration)
+    assert louder.averages == {}
+    np.testing.assert_allclose(noise_of(louder, HIGH_HZ).acceleration[1:], 4.0 * noises[0].acceleration[1:])
