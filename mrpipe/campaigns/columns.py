@@ -115,8 +115,7 @@ class DataFile:
         Raises
         ------
         UserError
-            If there is no such column, if several columns with different numbers have this name, or if it is not a
-            vector of numbers.
+            If there is no such column, or if it is not a vector of numbers.
         """
         name, index = self._resolve(column, where)
         try:
@@ -149,8 +148,6 @@ class DataFile:
             raise UserError(
                 self.path, where, f"column {column!r} is not a vector ({shape})", f"pick one column, as in {name}[:,0]"
             )
-        if isinstance(column, str) and _plain(column) == _plain(name):
-            self._require_one(name, array, where)
         return np.ascontiguousarray(array)
 
     def _remedy_of(self, kind: str) -> str:
@@ -191,8 +188,26 @@ class DataFile:
         asked = str(column).split("[")[0]
         raise UserError(self.path, where, f"no column {column!r}", nearest(asked, self.names))
 
-    def _require_one(self, name: str, array: FloatArray, where: str) -> None:
-        """Refuse a name that several columns of a table have, unless all of them hold the same numbers."""
+    def require_one(self, column: str | int, array: FloatArray, where: str) -> None:
+        """Refuse a name that several columns of a table have, unless all of them hold the same numbers.
+
+        Parameters
+        ----------
+        column
+            Name that the campaign gives; a position is never refused.
+        array
+            Numbers of this column, shape (n,).
+        where
+            Test and channel, for the message.
+
+        Raises
+        ------
+        UserError
+            If the numbers differ.
+        """
+        name = self._resolve(column, where)[0]
+        if not isinstance(column, str) or _plain(column) != _plain(name):
+            return
         places = [place for place, other in enumerate(self.names) if other == name or other.startswith(f"{name}#")]
         if not self.table or len(places) < 2:
             return

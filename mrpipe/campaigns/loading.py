@@ -326,6 +326,7 @@ def _read_channel(
     if channel.column is None:
         raise reader.source.error(_place_of(reader, name, place), "has neither column nor value", "write column: ...")
     values = file.column(channel.column, f"{where}, {name}")
+    file.require_one(channel.column, values, f"{where}, {name}")
     values = np.asarray(units.to_si(channel.scale * values + channel.offset, unit, quantity=quantity))
     return values if channel.mass_kg is None else -channel.mass_kg * values
 

@@ -172,8 +172,9 @@ def test_separators_of_thousands_in_quotes_are_named_and_a_long_word_is_shortene
 
 def test_a_name_of_several_columns_is_refused_where_their_numbers_differ() -> None:
     same = table_of_text(Path("a.csv"), "t,x,t,F\n0,1,0,5\n1,2,1,6\n")
-    assert same.column("t", "").tolist() == [0.0, 1.0]
+    same.require_one("t", same.column("t", ""), "")
     other = table_of_text(Path("a.csv"), "t,F,F\n0,1,5\n1,2,6\n")
     with pytest.raises(UserError, match=r"columns 1 and 2 have the name 'F'; name the right one by its position"):
-        other.column("F", "")
+        other.require_one("F", other.column("F", ""), "")
+    other.require_one(2, other.column(2, ""), "")
     assert other.column(2, "").tolist() == [5.0, 6.0]

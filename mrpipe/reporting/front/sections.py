@@ -129,7 +129,7 @@ def damper(facts: RunFacts) -> Section:
         )
     artifact = facts.artifact("close-loop.h5")
     if artifact is not None and "validation" in artifact.members("/"):
-        variables, before, after = _residual(artifact, str(summary.get("drive_unit") or "A"))
+        variables, before, after = _residual(artifact)
         section.figure(
             "residual",
             figures.residual_over(variables, before, after),
@@ -196,7 +196,7 @@ def _traced_model(section: Section, facts: RunFacts, loop: Mapping[str, Any]) ->
     )
 
 
-def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]], Any, Any]:
+def _residual(artifact: Artifact) -> tuple[list[tuple[str, Any]], Any, Any]:
     """Return the variables, and the residual before and after, of the validation tests."""
     measured = artifact.array("validation/measured")
     drive = artifact.array("validation/drive")
@@ -205,7 +205,7 @@ def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]
         ("velocity [mm/s]", 1e3 * artifact.array("validation/velocity")),
     ]
     if float(np.ptp(drive)) > 0.0:
-        variables.append((f"drive [{drive_unit}]", drive))
+        variables.append((f"drive [{artifact.unit('validation/drive')}]", drive))
     variables.append(("time in test [s]", artifact.array("validation/time")))
     return variables, measured - artifact.array("validation/before"), measured - artifact.array("validation/after")
 

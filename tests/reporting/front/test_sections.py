@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrpipe.artifacts import ArtifactWriter, Provenance
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.dampers.model import write_damper
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.front.sections import sections
+from mrpipe.reporting.front.sections import _residual, sections
 from mrpipe.reporting.page import first_screen, write_report
 from tests.exports.test_models import with_effect
 from tests.reporting.front.run import EFFECT, run_in, tracing
@@ -169,3 +169,12 @@ def test_a_damper_without_drive_has_no_largest_drive(tmp_path: Path) -> None:
 def _damper_texts(facts: RunFacts) -> str:
     (section,) = [item for item in sections(facts) if item.anchor == "damper"]
     return " ".join(str(item.get("text", "")) for item in section.items)
+
+
+def test_the_drive_of_the_residual_has_the_unit_of_its_data(tmp_path: Path) -> None:
+    with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("close-loop")) as artifact:
+        for name in ("measured", "before", "after", "displacement", "velocity", "time"):
+            artifact.put(f"validation/{name}", np.arange(3.0), unit="1", dims=("sample",))
+        artifact.put("validation/drive", np.arange(3.0), unit="V", dims=("sample",))
+    variables, _, _ = _residual(Artifact(tmp_path / "close-loop.h5"))
+    assert "drive [V]" in [name for name, _ in variables]
