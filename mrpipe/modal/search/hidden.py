@@ -21,6 +21,7 @@ from mrpipe.modal.search.selection import (
     Layout,
     all_floors_measured,
     certainty,
+    contradictory_phases,
     contradicts,
     largest_set,
     resolved_set,
@@ -45,8 +46,8 @@ def with_missing_modes(
 ) -> ModeSearch:
     """Return the modes plus those that all lines of the spectra show in addition, if there are any.
 
-    Missing modes are first searched up to a little above the known modes, then up to the end of the excitation. The
-    band of the modes found may end below a missing mode.
+    Missing modes are first searched up to a little above the known modes, then up to the end of the excitation of each
+    test. The band of the modes found may end below a missing mode.
 
     Parameters
     ----------
@@ -60,14 +61,15 @@ def with_missing_modes(
         Upper end of the band [Hz] set by the user; 0 means the end of the excitation.
     """
     best = search
-    end = max(high for _, high in bands_to_try(tests, search.band_hz[0], high_hz))
+    ends = sorted(high for _, high in bands_to_try(tests, search.band_hz[0], high_hz))
     for _ in range(_ROUNDS):
         missing = layout.floors - len(best.numbers)
         if missing <= 0:
             break
         near = _BAND * float(best.fit.angular_frequencies[-1]) / (2.0 * np.pi)
         found = None
-        for top in dict.fromkeys((min(end, near), end)):
+        # where one test ends below another, its noise beyond its own excitation would disturb the search
+        for top in [min(ends[-1], near), *(end for end in ends if end > near)]:
             wide = replace(best, band_hz=(best.band_hz[0], top))
             found = found or _with_more(wide, _spectra(wide, tests, top), layout, missing)
         if found is None:
@@ -153,9 +155,17 @@ def _with_hidden(
         for extra in sets_of_poles(known, band, number)[:_SETS]:
             omega = np.concatenate([known.angular_frequencies, [item.angular_frequency for item in extra]])
             zeta = np.concatenate([known.damping_ratios, [item.damping_ratio for item in extra]])
-            yield _in_band(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True))
+            yield _plausible(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True), known)
 
     return known, fits()
+
+
+def _plausible(fit: MultiModeFit, known: MultiModeFit) -> MultiModeFit:
+    """Return the fit without new poles that are beyond its lines or have contradictory phases."""
+    fit = _in_band(fit)
+    phases = contradictory_phases(fit)
+    kept = [i for i, omega in enumerate(fit.angular_frequencies) if not phases[i] or _is_among(omega, known)]
+    return fit.only(kept)
 
 
 def _in_band(fit: MultiModeFit) -> MultiModeFit:
@@ -192,7 +202,7 @@ def _refitted(
     """Fit the modes without the poles that are not modes; None if one of them then becomes doubtful."""
     keep = sorted(numbered)
     omega, zeta = fit.angular_frequencies[keep], fit.damping_ratios[keep]
-    refined = _in_band(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True))
+    refined = _plausible(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True), search.fit)
     again = _chosen(refined, layout)
     if contradicts(refined, layout) or len(again) < len(keep):
         return None

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.modal.fit.result import MultiModeFit
@@ -22,8 +23,12 @@ LARGEST_DAMPING = 0.1
 """Largest damping ratio of a mode of usual damping."""
 LEAST_DAMPING = 2e-6
 _DIVERGED_DAMPING = 0.25
-_CERTAIN_HEAVY = 0.02
-"""Largest relative standard error of the damping ratio of a heavily damped mode."""
+_CERTAIN = 0.02
+"""Relative standard error of a damping ratio below which it is certain."""
+_PHASE_LEVEL = 1e-3
+"""Probability of a real shape with the measured phases below which noise does not explain them."""
+_PROPORTIONAL = 0.3
+"""Largest imaginary share of a shape that damping which is not proportional, or a small delay, may cause."""
 _UNKNOWN_SHAPE = 0.35
 _LARGEST_IMAGINARY = 0.6
 _LARGEST_COUPLING = 0.15
@@ -104,7 +109,7 @@ def usable(fit: MultiModeFit, *, with_heavy: bool = False) -> BoolArray:
     """
     inside = (fit.damping_ratios < LARGEST_DAMPING) & (fit.damping_ratios > LEAST_DAMPING)
     if with_heavy:
-        inside |= (fit.damping_ratios < _DIVERGED_DAMPING) & (certainty(fit) > 1.0 / _CERTAIN_HEAVY)
+        inside |= (fit.damping_ratios < _DIVERGED_DAMPING) & (certainty(fit) > 1.0 / _CERTAIN)
     return np.asarray(inside & (fit.mode_coherence() >= LEAST_COHERENCE) & (shape_errors(fit) < _UNKNOWN_SHAPE))
 
 
@@ -117,6 +122,18 @@ def imaginary_share(fit: MultiModeFit) -> FloatArray:
 def real_modes(fit: MultiModeFit) -> list[int]:
     """Return the poles whose shape is real enough for a lightly damped structure; clocks must have been corrected."""
     return [int(i) for i in np.flatnonzero(imaginary_share(fit) <= _LARGEST_IMAGINARY)]
+
+
+def contradictory_phases(fit: MultiModeFit) -> BoolArray:
+    """Return the uncertain poles whose shape is more complex than its errors explain, shape (r,).
+
+    The shape of a weak mode is complex by noise only, if the damping is proportional and the clocks of the sensors were
+    corrected. A pole that describes errors of the model instead, for example where the excitation ends, has any phases.
+    """
+    ratio = fit.residues.imag / np.maximum(fit.residue_errors, 1e-300)
+    chance = stats.chi2.sf(np.sum(ratio**2, axis=0), fit.residues.shape[0])
+    uncertain = certainty(fit) < 1.0 / _CERTAIN
+    return np.asarray(uncertain & (chance < _PHASE_LEVEL) & (imaginary_share(fit) > _PROPORTIONAL))
 
 
 def sound(fit: MultiModeFit) -> list[int]:

@@ -7,6 +7,7 @@ import pytest
 
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.records import FrameTest
+from mrpipe.modal.search import hidden as search_of_hidden
 from mrpipe.modal.search.forced_modes import ModeSearch
 from mrpipe.modal.search.hidden import contested, with_missing_modes
 from mrpipe.modal.search.selection import Layout
@@ -103,3 +104,19 @@ def test_nothing_is_added_where_the_shaker_does_not_excite_the_mode(rig):
     )
     found = with_missing_modes(search, [cleared], Layout(tower.floors, tower.mass))
     assert found.numbers == search.numbers
+
+
+@pytest.mark.property
+def test_the_band_of_each_test_is_searched(rig, monkeypatch):
+    """A sweep that ends at 9 Hz and a random test up to 12 Hz: the sweep has only noise between 9 and 12 Hz."""
+    tower, _, test = rig
+    search = _search(tower, test, list(range(tower.floors - 1)))
+    near = 1.25 * float(search.fit.angular_frequencies[-1]) / (2 * np.pi)
+    tried = []
+    monkeypatch.setattr(
+        search_of_hidden, "bands_to_try", lambda *_: [(0.3, 1.5 * near), (0.3, 1.2 * near), (0.3, 0.9 * near)]
+    )
+    monkeypatch.setattr(search_of_hidden, "_spectra", lambda *_: ())
+    monkeypatch.setattr(search_of_hidden, "_with_more", lambda wide, *_: tried.append(wide.band_hz[1]))
+    with_missing_modes(search, [test], Layout(tower.floors, tower.mass))
+    assert tried == pytest.approx([near, 1.2 * near, 1.5 * near])

@@ -7,11 +7,13 @@ import pytest
 
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search import pursuit
 from mrpipe.modal.search.pursuit import HiddenPole, hidden_poles, sets_of_poles
 from mrpipe.modal.spectra import record_spectrum
 from mrpipe.structures import complex_modes, frame_from_parameter_set
 from tests.modal.rig import Rig, random_test
+from tests.modal.towers import Sensors, forced_test, hidden_modes, tower_with_hidden_modes
 
 pytestmark = pytest.mark.planted
 
@@ -63,3 +65,18 @@ def test_the_second_set_has_what_the_best_pole_of_a_gap_does_not_explain(spectru
         [first],
         [second],
     ]
+
+
+def test_a_weak_mode_is_supported_because_its_shape_is_real() -> None:
+    """With two parameters for each sensor, real and imaginary part, the criterion rejected this mode."""
+    tower, floor = tower_with_hidden_modes(np.random.default_rng(11), most=1, weakest=0.15)
+    missing = hidden_modes(tower, floor)[0] - 1
+    rng = np.random.default_rng(5)
+    force, seen = forced_test(tower, rng, Sensors(noise=0.1), floor, rate=50.0, duration_s=200.0, kind="random")
+    test = FrameTest("random", "random", 50.0, force, seen, (False,) * tower.floors, floor)
+    known = [mode for mode in range(tower.floors) if mode != missing]
+    omega, zeta = 2.0 * np.pi * tower.frequencies_hz, tower.damping_ratios
+    spectra = [record_spectrum(test, (0.3, 1.2 * float(tower.frequencies_hz[-1])))]
+    fit = fit_modes(spectra, omega[known], zeta[known], passes=2, evaluations=6)
+    [found] = hidden_poles(fit, (0.93 * omega[missing], 1.07 * omega[missing]), 3)
+    assert found.angular_frequency == pytest.approx(omega[missing], rel=0.01)

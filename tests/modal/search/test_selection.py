@@ -9,7 +9,7 @@ import pytest
 
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.records import FrameTest, Place
-from mrpipe.modal.search.selection import Layout, certainty, resolved_set
+from mrpipe.modal.search.selection import Layout, certainty, contradictory_phases, resolved_set
 from mrpipe.modal.spectra import record_spectrum
 from tests.modal.towers import Sensors, forced_test, random_tower
 
@@ -56,3 +56,19 @@ def test_the_certainty_of_a_pole_falls_with_the_error_of_its_damping(rig):
     covariance = fit.covariance.copy()
     covariance[5:, 5:] *= 4.0
     assert certainty(replace(fit, covariance=covariance)) == pytest.approx(0.5 * certainty(fit))
+
+
+@pytest.mark.property
+def test_an_uncertain_pole_whose_phases_are_no_noise_is_contradictory(rig):
+    _, fit = rig
+    turned = fit.residues.copy()
+    turned[:, 2] = np.abs(turned[:, 2]) * np.exp(1j * np.array([0.5, -0.6, 0.7, -0.4]))
+    complex_shape = replace(fit, residues=turned)
+    assert not contradictory_phases(complex_shape).any()
+    covariance = fit.covariance.copy()
+    covariance[5:, 5:] = np.diag(np.full(5, 0.15**2))
+    uncertain = replace(complex_shape, covariance=covariance)
+    assert contradictory_phases(uncertain).tolist() == [False, False, True, False, False]
+    # errors of the shape that are as large as its imaginary part explain it
+    loud = replace(uncertain, residue_errors=np.abs(turned))
+    assert not contradictory_phases(loud).any()
