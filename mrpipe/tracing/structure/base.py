@@ -11,7 +11,7 @@ from scipy import signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.bending import bounded_spectra, fitted_weighting, natural_frequencies
-from mrpipe.tracing.structure.fit import Base, Design, base_rows, coefficients, design_of, stacked
+from mrpipe.tracing.structure.fit import Base, Design, base_rows, design_of, stacked
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, possible_colours
 from mrpipe.tracing.structure.spectra import Band, Spectra, Weighting, motion_of, spectra_of, storey_sums
@@ -304,7 +304,7 @@ def _band_of_power(records: Sequence[FrameRecord]) -> Band:
 
 def shear_stiffness_of(design: Design, masses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return storey stiffnesses [N/m] of a fitted shear frame and its natural frequencies [Hz], shape (n,) each."""
-    linear = coefficients(design, None, np.zeros(0))
+    linear = design.linear
     storey = np.array([-numbers[0] for numbers in linear])
     positive = storey[storey > 0.0]
     storey = np.where(storey > 0.0, storey, float(np.median(positive)) if positive.size else 1.0)

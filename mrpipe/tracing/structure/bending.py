@@ -19,7 +19,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
-from mrpipe.tracing.structure.fit import Design, coefficients, design_of
+from mrpipe.tracing.structure.fit import Design, design_of
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, shape_of
 from mrpipe.tracing.structure.spectra import (
@@ -51,7 +51,7 @@ ROUNDS = 3
 def weighting_of(design: Design) -> Weighting:
     """Return the coefficients of a fitted general linear frame by which the noise of the sensors is propagated."""
     n, turns = len(design.residual), design.spectra[0].record.turns
-    linear = np.stack([numbers[: 2 * n + 2 + turns] for numbers in coefficients(design, None, np.zeros(0))])
+    linear = np.stack([numbers[: 2 * n + 2 + turns] for numbers in design.linear])
     return Weighting(-linear[:, :n], linear[:, 2 * n : 2 * n + 2], -linear[:, 2 * n + 2 :])
 
 

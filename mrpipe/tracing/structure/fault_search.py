@@ -14,7 +14,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
-from mrpipe.tracing.structure.fit import Base, Columns, Design, coefficients, design_of, predicted, stacked
+from mrpipe.tracing.structure.fit import Base, Columns, Design, design_of, predicted, stacked
 from mrpipe.tracing.structure.groups import Groups
 from mrpipe.tracing.structure.sensor_faults import (
     SensorFault,
@@ -156,7 +156,7 @@ def _exchanges(spectra: Sequence[Spectra], masses: FloatArray) -> list[SensorFau
     alone = []
     for record in spectra if len(spectra) > 1 else ():
         design = design_of("linear-frame", [item for item in spectra if item is not record])
-        linear = coefficients(design, None, np.zeros(0))
+        linear = design.linear
         before = _misfit(record, design.base, linear)
         for a, b in pairs:
             fault = SensorFault(a, record.record.name, exchanged_with=b)
@@ -242,7 +242,7 @@ def _step(fault: SensorFault, design: Design, masses: FloatArray) -> tuple[Float
 
 def _columns(fault: SensorFault, design: Design, masses: FloatArray) -> FloatArray:
     """Return the sensitivity to logarithmic gain and delay, projected as the residual, shape (2, equations)."""
-    linear = coefficients(design, None, np.zeros(0))
+    linear = design.linear
     columns = []
     for item in design.spectra:
         lines = np.zeros((2, item.record.floors, len(item.frequencies_hz)), dtype=np.complex128)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -71,8 +72,6 @@ class Design:
         The linear frame.
     spectra
         Spectra of the records.
-    width
-        Number of equations b of one storey, real and imaginary parts apart.
     residual
         Weighted residual of each storey, shape (n, 2 b).
     basis
@@ -85,7 +84,6 @@ class Design:
 
     base: Base
     spectra: tuple[Spectra, ...]
-    width: int
     residual: FloatArray
     basis: tuple[FloatArray, ...]
     solvers: tuple[FloatArray, ...]
@@ -100,6 +98,11 @@ class Design:
     def chi_square(self) -> float:
         """Mean square of the weighted residual; 1 is noise."""
         return float(np.sum(self.residual**2)) / self.size
+
+    @cached_property
+    def linear(self) -> list[FloatArray]:
+        """Coefficients of every storey without effects, each of shape (p,)."""
+        return coefficients(self, None, np.zeros(0))
 
     def project(self, columns: Sequence[Columns]) -> FloatArray:
         """Return the weighted columns minus their projection onto the linear model, shape (k, n, 2 b).
@@ -124,15 +127,18 @@ def weighted_columns(spectra: Sequence[Spectra], columns: Sequence[Columns]) -> 
 
 
 def _rows_of(base: Base, spectra: Sequence[Spectra], storey: int, width: int) -> tuple[FloatArray, FloatArray]:
-    rows, target = [], []
+    rows = []
     for item in spectra:
         own = base_rows(base, item, storey)
         # records without a damper or a shaker have no such load: their columns are zero
         full = np.zeros((width, own.shape[1]), dtype=np.complex128)
         full[: len(own)] = own
         rows.append(stacked(full * item.weight[storey]))
-        target.append(stacked(item.target[storey] * item.weight[storey]))
-    return np.concatenate(rows, axis=-1), np.concatenate(target, axis=-1)
+    return np.concatenate(rows, axis=-1), _target_of(spectra, storey)
+
+
+def _target_of(spectra: Sequence[Spectra], storey: int) -> FloatArray:
+    return np.concatenate([stacked(item.target[storey] * item.weight[storey]) for item in spectra], axis=-1)
 
 
 def design_of(base: Base, spectra: Sequence[Spectra]) -> Design:
@@ -151,7 +157,7 @@ def design_of(base: Base, spectra: Sequence[Spectra]) -> Design:
         residuals.append(target - basis @ (basis.T @ target))
         bases.append(basis)
         free += int(kept.sum())
-    return Design(base, tuple(spectra), width, np.stack(residuals), tuple(bases), tuple(solvers), free)
+    return Design(base, tuple(spectra), np.stack(residuals), tuple(bases), tuple(solvers), free)
 
 
 @dataclass(frozen=True)
@@ -202,7 +208,7 @@ def coefficients(design: Design, columns: Sequence[Columns] | None, amplitudes: 
     found = []
     weighted = weighted_columns(design.spectra, columns) if columns is not None else None
     for storey in range(len(design.basis)):
-        target = _rows_of(design.base, design.spectra, storey, design.width)[1]
+        target = _target_of(design.spectra, storey)
         if weighted is not None:
             target = target - amplitudes @ weighted[:, storey]
         found.append(np.asarray(design.solvers[storey] @ (design.basis[storey].T @ target)))

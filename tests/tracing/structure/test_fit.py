@@ -80,7 +80,7 @@ def test_amplitudes_are_solved_for_and_none_is_negative(amplitude: float) -> Non
     columns = [design().project(planted(seed)) for seed in (1, 2)]
     projected = np.concatenate(columns)
     changed = Design(
-        design().base, design().spectra, design().width, design().residual + amplitude * columns[0][0] - columns[1][0],
+        design().base, design().spectra, design().residual + amplitude * columns[0][0] - columns[1][0],
         design().basis, design().solvers, design().free,
     )  # fmt: skip
     found = solve(changed, projected)
