@@ -39,3 +39,18 @@ def duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def in_percent(ratio: float, decimals: int = 0, *, signed: bool = False) -> str:
+    """Return a ratio in percent, with a space before the sign as SI requires.
+
+    Parameters
+    ----------
+    ratio
+        The ratio [1].
+    decimals
+        Number of decimals.
+    signed
+        Whether a positive number has a plus sign.
+    """
+    return f"{100.0 * ratio:{'+' if signed else ''}.{decimals}f} %"

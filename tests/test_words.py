@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.words import counted, duration, listed, noun, shell_word
+from mrpipe.words import counted, duration, in_percent, listed, noun, shell_word
 
 pytestmark = pytest.mark.property
 
@@ -32,3 +32,7 @@ def test_a_path_is_one_word_of_a_shell() -> None:
     for path in ("runs/a", "Mein Projekt ß", "it's"):
         assert shlex.split(f"cd {shell_word(Path(path))}") == ["cd", path]
     assert shell_word("runs/a") == "runs/a"
+
+
+def test_percentages() -> None:
+    assert [in_percent(0.934), in_percent(-0.05, 1), in_percent(0.5, signed=True)] == ["93 %", "-5.0 %", "+50 %"]

@@ -13,6 +13,7 @@ import typer
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.cli.stage_commands import build_and_print
 from mrpipe.errors import UserError
+from mrpipe.words import in_percent
 
 NAMES = {"ten-storey": "ten_storey", "base-isolated": "base_isolated", "wind": "wind"}
 _MODEL_KEY = {"ten-storey": "structures", "base-isolated": "model", "wind": "model"}
@@ -89,7 +90,10 @@ def _more_facts(summary: Mapping[str, Any]) -> list[str]:
     if "fixed_base_periods_s" in summary:
         fixed = ", ".join(f"{value:.4g}" for value in summary["fixed_base_periods_s"][:3])
         isolated, ratio = summary["isolated_period_s"], summary["isolated_damping_ratio"]
-        lines.append(f"fixed base {fixed} s; isolated {isolated:.4g} s at {ratio:.1%} (rigid building on its bearings)")
+        lines.append(
+            f"fixed base {fixed} s; isolated {isolated:.4g} s at {in_percent(ratio, 1)} "
+            "(rigid building on its bearings)"
+        )
     if "motion_details" in summary:
         details = summary["motion_details"]
         peaks = ", ".join(f"{value:.4g}" for value in details["peaks_m_s2"])

@@ -18,6 +18,7 @@ from mrpipe.control.laws import all_laws, law_named, law_names
 from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
+from mrpipe.words import in_percent
 
 Source = Literal["exact", "closed-form", "published"]
 
@@ -353,7 +354,8 @@ def validity_warnings(
             )
         elif negative > 0.9 * limit:
             said.append(
-                f"{law}: negative stiffness is at {negative / limit:.0%} of the static limit of {-limit:.0f} N/m"
+                f"{law}: negative stiffness is at {in_percent(negative / limit)} of the static limit of "
+                f"{-limit:.0f} N/m"
             )
         needed = needed_force(law_named(law), item.gains, amplitude_m, omega)
         if needed <= 0.0:
@@ -362,8 +364,8 @@ def validity_warnings(
             said.append(f"{law}: needs {needed:.0f} N, but the damper gives at most {largest_force_n:.0f} N")
         if residual_force_n > 0.3 * needed:
             said.append(
-                f"{law}: the residual force of {residual_force_n:.0f} N is {residual_force_n / needed:.0%} of the "
-                f"{needed:.0f} N needed at {1e3 * amplitude_m:.1f} mm: the residual force limits the law, "
+                f"{law}: the residual force of {residual_force_n:.0f} N is {in_percent(residual_force_n / needed)} of "
+                f"the {needed:.0f} N needed at {1e3 * amplitude_m:.1f} mm: the residual force limits the law, "
                 "not the largest force"
             )
     return said

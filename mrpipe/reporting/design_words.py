@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from mrpipe.words import in_percent
+
 _UNITS = {"c_n_s_m": ("c", "N s/m"), "k_n_m": ("k", "N/m"), "alpha_n_m": ("alpha", "N/m")}
 
 
@@ -20,7 +22,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if best["improvement"] > 0.005:
         sentences.append(f"This is {100.0 * best['improvement']:.0f} % better than at its calibrated gains.")
     for name, excess in best["exceeds_limits"].items():
-        sentences.append(f"No design keeps all limits: this one exceeds that of {name} by {excess:.1%}.")
+        sentences.append(f"No design keeps all limits: this one exceeds that of {name} by {in_percent(excess, 1)}.")
     others = sorted(
         ((name, item) for name, item in summary["laws"].items() if name != summary["best"]),
         key=lambda entry: float(entry[1]["objective"]),
@@ -38,7 +40,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     elif uncertainty:
         sentences.append(
             f"In {uncertainty['draws']} structures and dampers drawn from their uncertainty, {summary['best']} is the "
-            f"best law with probability {best['probability_best']:.2f}; its mean regret is {uncertainty['regret']:.1%}."
+            f"best law with probability {best['probability_best']:.2f}; "
+            f"its mean regret is {in_percent(uncertainty['regret'], 1)}."
         )
         if uncertainty["sensitivities"] and best["probability_best"] < 0.95:
             first = uncertainty["sensitivities"][0]
@@ -62,7 +65,7 @@ def _confirmed(found: Mapping[str, Any]) -> str:
 
 def _smaller(improvement: float) -> str:
     """Return by how much a value is smaller, or larger where the improvement is negative."""
-    return f"{abs(improvement):.1%} {'smaller' if improvement >= 0.0 else 'larger'}"
+    return f"{in_percent(abs(improvement), 1)} {'smaller' if improvement >= 0.0 else 'larger'}"
 
 
 def _against_untraced(found: Mapping[str, Any]) -> str:
@@ -71,7 +74,7 @@ def _against_untraced(found: Mapping[str, Any]) -> str:
         f"For the damper before the tracing the best design would be {design['law']} "
         f"({gains_in_words(design['gains']) or 'no gains'}). With the traced damper in the loop that design has a "
         f"largest RMS top displacement of {1e3 * with_traced['peak_rms_x_top_m']:.1f} mm; its objective is "
-        f"{found['regret']:.1%} above that of the best design for the traced damper."
+        f"{in_percent(found['regret'], 1)} above that of the best design for the traced damper."
     )
 
 

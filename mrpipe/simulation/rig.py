@@ -31,6 +31,7 @@ from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.structures.over_amplitude import read_frame_at
 from mrpipe.structures.records import IMPOSSIBLE_PEAK
+from mrpipe.words import in_percent
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Name of a damper of a run -> stage whose artifact contains it."""
@@ -247,8 +248,8 @@ def _adjusted(
     )
     if error > SETTLED and warn is not None:
         warn(
-            f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s^2 misses it by {error:.0%}; "
-            "give simulate.excitation.base_amplitude_m_s2 for another"
+            f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s^2 misses it by "
+            f"{in_percent(error)}; give simulate.excitation.base_amplitude_m_s2 for another"
         )
     if warn is not None and (implausible := amplitude_warning(amplitude)):
         warn(implausible)

@@ -8,6 +8,7 @@ from typing import Any
 from mrpipe.control.laws import law_names
 from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.words import in_percent
 
 
 def simulate_stage(law: str) -> Stage:
@@ -50,7 +51,9 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     }
     values = indices(response, excitation, **judged)
     if values["energy_balance_error"] > 5e-3:
-        context.warn(f"energy balance is off by {values['energy_balance_error']:.2%}: raise simulate.plant_rate_hz")
+        context.warn(
+            f"energy balance is off by {in_percent(values['energy_balance_error'], 2)}: raise simulate.plant_rate_hz"
+        )
     against = None
     if viscous is not None:
         against = indices(viscous, excitation, **judged)

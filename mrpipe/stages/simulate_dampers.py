@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.loop_inputs import variant_for_dampers
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
@@ -37,7 +38,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     response = rig.run(excitation, rng=context.rng, initial_state=dampers_release(rig, settings.excitation))
     summary = response_summary(rig, response, excitation)
     if summary["energy_balance_error"] > 5e-3:
-        context.warn(f"energy balance is off by {summary['energy_balance_error']:.2%}: raise simulate.plant_rate_hz")
+        context.warn(
+            f"energy balance is off by {in_percent(summary['energy_balance_error'], 2)}: raise simulate.plant_rate_hz"
+        )
     with context.write("response-dampers.h5") as artifact:
         write_dampers_response(artifact, rig, response)
         artifact.put_json("indices", {key: value for key, value in summary.items() if key != "real_time_factor"})

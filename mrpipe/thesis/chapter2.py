@@ -18,6 +18,7 @@ from mrpipe.signals.prepared import PreparedTest, read_prepared
 from mrpipe.thesis.bench import Bench
 from mrpipe.thesis.claim import Missing, Outcomes, Value
 from mrpipe.units import same_unit_dimension
+from mrpipe.words import in_percent
 
 FREQUENCIES_HZ = (0.5, 1.0, 1.27, 1.8, 2.2)
 AMPLITUDES_M = (5e-3, 10e-3)
@@ -140,7 +141,8 @@ def _sweep(artifact: Artifact) -> Outcomes:
             continue
         change, uncertainty = float(item["change"]), float(item["uncertainty"])
         shown = change if abs(change) > uncertainty else 0.0
-        said = f"{item['reference']} against {item['alternative']}: {change:+.0%}, uncertainty {uncertainty:.0%}"
+        compared = f"{item['reference']} against {item['alternative']}"
+        said = f"{compared}: {in_percent(change, signed=True)}, uncertainty {in_percent(uncertainty)}"
         found[entry] = Value(shown, "sweep of this run", said)
     hidden = artifact.json("choice")["hidden"]
     found["A22b"] = Value("-".join(str(count) for count in hidden), "choice of the sweep of this run")

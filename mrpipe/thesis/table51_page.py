@@ -24,6 +24,7 @@ from mrpipe.thesis.table51 import (
     log_errors,
     mean_log_error,
 )
+from mrpipe.words import in_percent
 
 _AXES = {
     "rms_x5_m": ("rms x5 [mm]", 1e3),
@@ -105,7 +106,9 @@ def words(cases: Mapping[str, Case]) -> list[str]:
     )
     start = mean_log_error(plain, "T5.1m")
     steps = [(name, mean_log_error(cases[name], "T5.1m")) for name in _MEASURED[1:] if name in cases]
-    parts = "; ".join(f"{name}: {error:.3f} ({1.0 - error / start:+.0%} explained)" for name, error in steps)
+    parts = "; ".join(
+        f"{name}: {error:.3f} ({in_percent(1.0 - error / start, signed=True)} explained)" for name, error in steps
+    )
     said.append(f"Measured column: the mean log error is {start:.3f} for {plain.name}. {parts}.")
     worst = max(
         (

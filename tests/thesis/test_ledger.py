@@ -113,7 +113,7 @@ def test_findings_of_the_sweep_are_read(tmp_path: Path) -> None:
     rows[2] = {**rows[2], "change": -0.15}
     rows[6] = {**rows[6], "verdict": "not tested"}
     found = _sweep(_artifact(tmp_path / "sweep.h5", findings=rows, choice={"hidden": [6, 6]}))
-    assert found["F2-velocity"] == Value(0.5, "sweep of this run", "a against b: +50%, uncertainty 20%")
+    assert found["F2-velocity"] == Value(0.5, "sweep of this run", "a against b: +50 %, uncertainty 20 %")
     assert isinstance(found["F2-displacement"], Value) and found["F2-displacement"].value == -0.3
     # a change within its uncertainty is none
     assert isinstance(found["F2-acceleration"], Value) and found["F2-acceleration"].value == 0.0
@@ -196,7 +196,7 @@ def test_table_5_1_is_explained_by_the_errors_of_the_cases() -> None:
     cases = {case.name: case for case in made}
     assert table51.mean_log_error(cases[f"{table51.PLAIN}, {table51.AT_OWN}"], "T5.1m") == pytest.approx(0.2)
     said = " ".join(table51_page.words(cases))
-    assert "(+50% explained)" in said and "(+75% explained)" in said
+    assert "(+50 % explained)" in said and "(+75 % explained)" in said
     rows = table51_page.error_rows(cases)
     errors = [row["all"] for row in rows if row["column"] == "measured column"]
     assert errors == ["0.400", "0.250", "0.200", "0.300", "0.100"]
