@@ -160,17 +160,11 @@ def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> 
     UserError
         If an effect is unknown; the message names the nearest known effect.
     """
-    if not header.declared_effects:
+    if not header.declared_effects or "" in own:
         return
-    from mrpipe.artifacts.yaml_source import nearest, read_yaml
+    from mrpipe.effects.declared import require_known
 
-    if "" in own:
-        return
-    known = effects_of_rig(header.rig) | set(own)
-    for index, name in enumerate(header.declared_effects):
-        if name not in known:
-            source = read_yaml(header.file)
-            raise source.error(("declared_effects", index), f"unknown effect {name!r}", nearest(name, known))
+    require_known(header.declared_effects, effects_of_rig(header.rig) | set(own), header.file)
 
 
 def require_known_laws(header: CampaignHeader) -> None:
