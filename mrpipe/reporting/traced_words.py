@@ -98,3 +98,30 @@ def unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
     )
     rivals = sorted({name for item in terms for name in item["tied_with"]})
     return f"In addition, {names} {rest}{f' against {listed(rivals)}' if rivals else ''}."
+
+
+def declared_in_words(names: Sequence[str]) -> str:
+    """Return a sentence on the effects that the campaign declares; empty without any."""
+    if not names:
+        return ""
+    said = "this effect is" if len(names) == 1 else "these effects are"
+    return f"The campaign declares {listed(names)}; {said} part of the model from the start."
+
+
+def notes_on_model(loop: Mapping[str, Any], *, named: bool) -> list[str]:
+    """Return sentences on the parts of the final model that no named effect explains.
+
+    Parameters
+    ----------
+    loop
+        Summary of `close-loop`.
+    named
+        Whether effects of the damper are named.
+    """
+    unproven = unproven_in_words(loop.get("further_terms") or [])
+    if unproven and named:
+        unproven += (
+            " All parameters are fitted again then, so that those of the effects may differ a little from above."
+        )
+    notes = (exchange_in_words(loop), declared_in_words(loop.get("declared_effects") or []), unproven)
+    return [text for text in notes if text]

@@ -18,7 +18,7 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
-from mrpipe.reporting.traced_words import exchange_in_words, shares_in_words, shown_candidates, unproven_in_words
+from mrpipe.reporting.traced_words import notes_on_model, shares_in_words, shown_candidates
 from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed
@@ -181,14 +181,8 @@ def _traced_model(section: Section, facts: RunFacts, loop: Mapping[str, Any]) ->
         # the file of an own effect was moved or changed: the other results do not depend on it
         section.text(f"The parameters of the final model cannot be shown: {error}")
         return
-    unproven = unproven_in_words(loop.get("further_terms") or [])
-    if unproven and statements.proper_effects(loop):
-        unproven += (
-            " All parameters are fitted again then, so that those of the effects may differ a little from above."
-        )
-    for text in (exchange_in_words(loop), unproven):
-        if text:
-            section.text(text)
+    for text in notes_on_model(loop, named=bool(statements.proper_effects(loop))):
+        section.text(text)
     section.table(
         "traced",
         tables.traced_parameters(model),

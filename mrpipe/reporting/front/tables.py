@@ -36,8 +36,8 @@ def rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
             {
                 "effect": item["name"],
                 "form": item.get("form", ""),
-                f"recovers {shares_in_words(loop)} [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
-                "error then [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
+                f"share {shares_in_words(loop)} [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
+                "error with it [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
             }
             for item in shown_candidates(loop)[:8]
         ]

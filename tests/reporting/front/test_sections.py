@@ -178,3 +178,14 @@ def test_the_drive_of_the_residual_has_the_unit_of_its_data(tmp_path: Path) -> N
         artifact.put("validation/drive", np.arange(3.0), unit="V", dims=("sample",))
     variables, _, _ = _residual(Artifact(tmp_path / "close-loop.h5"))
     assert "drive [V]" in [name for name, _ in variables]
+
+
+@pytest.mark.golden
+def test_declared_effects_are_said_where_their_parameters_stand(tmp_path: Path) -> None:
+    """The table of the final model had listed a declared effect without a word on where it comes from."""
+    for names, said in ((["backlash"], "The campaign declares backlash; this effect is part of the model"), ([], "")):
+        facts = run_in(tmp_path, tracing(declared_effects=names))
+        with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("close-loop")) as artifact:
+            write_damper(artifact, with_effect("heating", "cooling"))
+        texts = _damper_texts(facts)
+        assert said in texts and ("declares" in texts) is bool(names)

@@ -59,9 +59,9 @@ def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: s
     assert shares == ([0.998, 0.997] if taken == "bouc-wen" else [0.95, 0.1])
     table = rivals(loop)
     if taken == "bouc-wen":
-        assert table["recovers of the recoverable residual [%]"].tolist() == ["99.8", "99.7"]
+        assert table["share of the recoverable residual [%]"].tolist() == ["99.8", "99.7"]
     else:
-        heading = "recovers of what the base form dahl-stiffness leaves above the noise [%]"
+        heading = "share of what the base form dahl-stiffness leaves above the noise [%]"
         assert table["effect"].tolist() == ["accumulator", "stribeck"]
         assert table[heading].tolist() == ["95.0", "10.0"]
 
