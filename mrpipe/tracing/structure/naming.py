@@ -19,7 +19,9 @@ BY_STOREY = 3
 """Numerical technique: with fewer storeys their largest amplitude is reported, else the median of acting storeys."""
 
 
-def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRules) -> list[NamedEffect]:
+def named_effects(
+    selection: FrameSelection, after: FrameModel, rules: NamingRules, *, explained: bool
+) -> list[NamedEffect]:
     """Return the effects that were chosen, with their places, parameters, rivals and confidence.
 
     Parameters
@@ -30,11 +32,15 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
         Model with all chosen effects; its amplitudes are in the order of the effects.
     rules
         Rules for naming an effect.
+    explained
+        Whether the effects explain the error on the validation tests. If they leave a part of it, the form of an effect
+        may stand for another effect, so that their probability is lower.
     """
     found = []
     total = selection.share(selection.residual)
+    proven = explained and total >= rules.named_share
     for place, (item, own) in enumerate(by_effect(selection, after.amplitudes)):
-        most = _most_probable(selection, place, total >= rules.named_share)
+        most = _most_probable(selection, place, proven)
         if place < selection.declared:
             continue
         candidates = selection.rounds[place - selection.declared]

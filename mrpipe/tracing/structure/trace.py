@@ -223,9 +223,9 @@ def _summary(
     validation: ValidationRules,
 ) -> dict[str, Any]:
     first, last = frame_score(before, problem.validation), frame_score(after, problem.validation)
-    named = [] if reason else named_effects(selection, after, rules)
     floor = noise_floor(problem.validation, selection.groups.scale)
     errors = Errors(first.nrmse, last.nrmse, floor, _flexible(problem, selection, before, first.nrmse))
+    named = [] if reason else named_effects(selection, after, rules, explained=errors.explained(validation))
     judgement = Judgement(selection, named, reason, errors, between, differing, rules, validation)
     return {
         "model": selection.base,

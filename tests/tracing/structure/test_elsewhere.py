@@ -50,7 +50,7 @@ PAIR = "impact and cubic-stiffness"
 @pytest.mark.planted
 def test_a_weaker_effect_in_another_storey_is_named_where_it_acts() -> None:
     found = selected(PAIR)
-    named = named_effects(found, model_of(found.design, found.chosen, found.about), NamingRules())
+    named = named_effects(found, model_of(found.design, found.chosen, found.about), NamingRules(), explained=True)
     assert [(item.name, item.place) for item in named] == [("impact", "floor 2"), ("cubic-stiffness", "storey 3")]
     # the stronger effect alone explains what counts as proven
     alone = selected(PAIR, most=1)
@@ -109,3 +109,12 @@ def test_an_effect_of_one_storey_has_no_force_in_the_others() -> None:
     kinds = len(friction.forms[0].amplitudes)
     np.testing.assert_allclose(lines[2 * kinds :], all_lines[2 * kinds :])
     assert np.any(lines[2 * kinds :]) and not np.any(lines[: 2 * kinds])
+
+
+@pytest.mark.planted
+def test_an_effect_that_leaves_a_part_of_the_validation_error_is_less_probable() -> None:
+    """Its confidence had stayed that of an effect which explains everything, at two noise floors."""
+    found = selected(PAIR, most=1)
+    model = model_of(found.design, found.chosen, found.about)
+    sure, doubtful = (named_effects(found, model, NamingRules(), explained=value)[0] for value in (True, False))
+    assert sure.confidence > found.rules.probability_in_part >= doubtful.confidence
