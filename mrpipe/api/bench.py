@@ -285,7 +285,7 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
         list(tests),
         library,
         declared_effects(campaign.declared_effects, {**damper_effects(), **library}, campaign.file),
-        tracing_options(chosen, tests[0].drive_unit),
+        tracing_options(chosen),
         rng=np.random.default_rng(seed),
         jobs=jobs,
         progress=silent,

@@ -43,21 +43,14 @@ def nearest(word: str, known: Iterable[str]) -> str:
     folded = {item.casefold(): item for item in words}
     close = difflib.get_close_matches(str(word), words, n=len(words) or 1, cutoff=0.5)
     # of equally close words, the first letter is rarely the wrong one: `Fx` is F and not x
-    close.sort(key=lambda item: (-_ratio(item, str(word)), item[0].casefold() != str(word)[0].casefold(), item))
+    unlike = {item: -difflib.SequenceMatcher(a=item, b=str(word)).ratio() for item in close}
+    close.sort(key=lambda item: (unlike[item], item[0].casefold() != str(word)[0].casefold(), item))
     # of words that are about equally close, letters in another order are the likeliest mistake
     turned = [item for item in close if sorted(item.casefold()) == sorted(str(word).casefold())]
     same = folded.get(str(word).casefold())
     if same or close:
         return f"did you mean {same or (turned or close)[0]}?"
     return f"known: {', '.join(words)}" if words else "there are none"
-
-
-def _ratio(first: str, second: str) -> float:
-    """Return how close two words are, as difflib counts it: 1 for equal words."""
-    matcher = difflib.SequenceMatcher()
-    matcher.set_seq2(second)
-    matcher.set_seq1(first)
-    return matcher.ratio()
 
 
 def shown(value: Any) -> str:

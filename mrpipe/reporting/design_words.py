@@ -20,7 +20,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     ]
     sentences.append(f"The objective is {summary['objective']}; it is {best['objective']:.3f}.")
     if best["improvement"] > 0.005:
-        sentences.append(f"This is {100.0 * best['improvement']:.0f} % better than at its calibrated gains.")
+        sentences.append(f"This is {in_percent(best['improvement'])} better than at its calibrated gains.")
     for name, excess in best["exceeds_limits"].items():
         sentences.append(f"No design keeps all limits: this one exceeds that of {name} by {in_percent(excess, 1)}.")
     others = sorted(
@@ -29,8 +29,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     )
     if others:
         name, item = others[0]
-        larger = 100.0 * (item["objective"] / best["objective"] - 1.0)
-        sentences.append(f"The second best law is {name}; its objective is {larger:.0f} % larger.")
+        larger = in_percent(item["objective"] / best["objective"] - 1.0)
+        sentences.append(f"The second best law is {name}; its objective is {larger} larger.")
     sentences.append(_confirmed(summary["confirmation"]))
     if "before_tracing" in summary:
         sentences.append(_against_untraced(summary["before_tracing"]))

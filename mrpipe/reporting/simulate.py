@@ -15,6 +15,7 @@ from mrpipe.simulation.indices import FLOWING, decay_damping
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.training_range import RangeCheck
+from mrpipe.words import in_percent
 
 VISCOUS = "vd"
 """Law that the others are compared with."""
@@ -41,8 +42,9 @@ def describe(
         Indices of the run, and of vd under the same excitation where it was run.
     """
     sink.text(_words(law, excitation, values))
-    others = ", and those of vd under the same excitation" if viscous is not None and law != VISCOUS else ""
-    sink.table("indices", _table(law, values, viscous), f"Indices{others} (SI).")
+    table = _table(law, values, viscous)
+    others = f", and those of {VISCOUS} under the same excitation" if f"over {VISCOUS}" in table else ""
+    sink.table("indices", table, f"Indices{others} (SI).")
     last = excitation.steady_s[1]
     cycle = 2.0 * np.pi / excitation.frequency_rad_s if np.isfinite(excitation.frequency_rad_s) else last / 4.0
     shown = (response.time_s >= last - 4.0 * cycle) & (response.time_s < last)
@@ -97,8 +99,8 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
     return (
         f"Law {law}, {excitation.details['kind']} excitation: rms top displacement "
         f"{1e3 * values['rms_x_top_m']:.1f} mm, first floor {1e3 * values['rms_x1_m']:.1f} mm; "
-        f"{100.0 * values['switched_off_share']:.0f} % of the time switched off, "
-        f"{100.0 * values['clipped_share']:.0f} % clipped.{decay} "
+        f"{in_percent(values['switched_off_share'])} of the time switched off, "
+        f"{in_percent(values['clipped_share'])} clipped.{decay} "
         f"Energy balance closed to {values['energy_balance_error']:.1e}; "
         f"{values['real_time_factor']:.0f} times real time."
     )
@@ -108,8 +110,10 @@ def _table(law: str, values: Mapping[str, Any], viscous: Mapping[str, Any] | Non
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     frame = pd.DataFrame({"index": list(numbers), law: list(numbers.values())})
     if viscous is not None and law != VISCOUS:
-        frame["vd"] = [viscous.get(key) for key in numbers]
-        frame["over vd"] = [value / viscous[key] if viscous.get(key) else None for key, value in numbers.items()]
+        frame[VISCOUS] = [viscous.get(key) for key in numbers]
+        frame[f"over {VISCOUS}"] = [
+            value / viscous[key] if viscous.get(key) else None for key, value in numbers.items()
+        ]
     return frame
 
 

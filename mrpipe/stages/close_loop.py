@@ -44,7 +44,6 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     chosen, fitted = _identified(context)
     options = tracing_options(
         settings,
-        tests[0].drive_unit,
         context.settings.identify_damper.form_files,
         _declared(context) if chosen is None else chosen.form,
     )

@@ -43,7 +43,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for campaign in campaigns:
         known = {**all_structural_effects(), **damper_effects(), **library}
         declared_effects(campaign.declared_effects, known, campaign.file)
-    asked = tracing_options(settings, campaigns[0].drive_unit)
+    asked = tracing_options(settings)
     # few long tests: fewer forms are refitted, and nothing filtered their force
     options = asked.changed(refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
     traced = trace_structure(

@@ -1,4 +1,4 @@
-"""Gain of an effect on tests left out of its fit; bench and structure compute it each in its own way."""
+"""Gain of an effect: on tests left out of its fit, and on validation tests against a ceiling."""
 
 from __future__ import annotations
 
@@ -24,3 +24,9 @@ class Gain:
     def significant(self) -> bool:
         """Whether the interval lies above zero."""
         return self.interval[0] > 0.0
+
+
+def recovered_share(before: float, after: float, ceiling: float) -> float:
+    """Return the share by which the squared error beyond a ceiling falls from `before` to `after`, 0 to 1."""
+    able = before**2 - min(ceiling, after) ** 2
+    return float(min(1.0, max(0.0, (before**2 - after**2) / able))) if able > 0.0 else 0.0

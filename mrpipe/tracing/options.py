@@ -162,7 +162,7 @@ class TracingOptions(TracingSettings):
 
 
 def tracing_options(
-    settings: TracingSettings, drive_unit: str = "", form_files: Sequence[Path] = (), identified: str = DEFAULT_FORM
+    settings: TracingSettings, form_files: Sequence[Path] = (), identified: str = DEFAULT_FORM
 ) -> TracingOptions:
     """Return the options of a tracing, on a bench or of a structure.
 
@@ -170,8 +170,6 @@ def tracing_options(
     ----------
     settings
         Section `close_loop` of the settings.
-    drive_unit
-        `A` or `V`. Empty: not known yet; the tracing sets it to that of its tests.
     form_files
         Files of the user that define base forms with which the damper was identified; these forms are tried in the
         tracing too.
@@ -182,4 +180,4 @@ def tracing_options(
     values["form_files"] = tuple(dict.fromkeys([*settings.form_files, *form_files]))
     if settings.model == IDENTIFIED:
         values["model"] = identified
-    return TracingOptions(**values, drive_unit=drive_unit)
+    return TracingOptions(**values)

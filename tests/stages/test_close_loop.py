@@ -167,9 +167,9 @@ def test_the_damper_that_was_identified_is_an_input_and_what_changes_it_makes_th
 @pytest.mark.property
 def test_the_declared_form_is_the_identified_one_unless_the_settings_name_another() -> None:
     section = config_model().model_validate({}).close_loop
-    assert tracing_options(section, "A", identified="dahl").model == "dahl"
+    assert tracing_options(section, identified="dahl").model == "dahl"
     named = config_model().model_validate({"close_loop": {"model": "lugre"}}).close_loop
-    assert tracing_options(named, "A", identified="dahl").model == "lugre"
+    assert tracing_options(named, identified="dahl").model == "lugre"
 
 
 @pytest.mark.planted

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mrpipe.tracing.gain import recovered_share
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests
@@ -42,9 +43,7 @@ class Errors:
     @property
     def recovered(self) -> float:
         """Share of the squared error beyond the ceiling that the named effects remove, 0 to 1."""
-        able = self.before**2 - self.ceiling**2
-        share = (self.before**2 - self.after**2) / able if able > 0.0 else 0.0
-        return min(1.0, max(0.0, share))
+        return recovered_share(self.before, self.after, self.ceiling)
 
     def explained(self, rules: ValidationRules) -> bool:
         """Return whether the named effects reach the noise floor, or most of what a flexible model reaches.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mrpipe.tracing.gain import recovered_share
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import VerdictClass
 
@@ -97,12 +98,6 @@ def lowest_error(ceiling: float, interval: tuple[float, float], after: float) ->
     """
     lowest = min(ceiling, after)
     return lowest, (min(interval[0], lowest), max(interval[1], lowest))
-
-
-def recovered_share(before: float, after: float, ceiling: float) -> float:
-    """Return the share by which the squared error beyond a ceiling falls from `before` to `after`, 0 to 1."""
-    able = before**2 - min(ceiling, after) ** 2
-    return float(min(1.0, max(0.0, (before**2 - after**2) / able))) if able > 0.0 else 0.0
 
 
 def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:

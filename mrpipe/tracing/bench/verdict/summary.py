@@ -20,10 +20,11 @@ from mrpipe.tracing.bench.residuals.error_measures import score
 from mrpipe.tracing.bench.residuals.nuisances import session_of
 from mrpipe.tracing.bench.residuals.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.selection.select import Selection
-from mrpipe.tracing.bench.validation.judgement import lowest_error, recovered_share
+from mrpipe.tracing.bench.validation.judgement import lowest_error
 from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence, open_tests
 from mrpipe.tracing.bench.verdict.naming import Named, ranking
 from mrpipe.tracing.bench.verdict.offsets import OffsetFinding
+from mrpipe.tracing.gain import recovered_share
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import TracingRules
 from mrpipe.tracing.verdict import Score, Unexplained

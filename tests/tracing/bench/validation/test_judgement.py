@@ -12,9 +12,9 @@ from mrpipe.tracing.bench.validation.judgement import (
     Evidence,
     classify,
     lowest_error,
-    recovered_share,
 )
 from mrpipe.tracing.bench.verdict.naming import calibrated_probability
+from mrpipe.tracing.gain import recovered_share
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
 
