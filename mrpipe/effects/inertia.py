@@ -71,9 +71,8 @@ EFFECT = Effect(
             "F + (m + m1 u) a",
             (
                 _MASS,
-                amplitude(
-                    "mass_rate", "kg/drive", "change of the mass with the drive", "force/acceleration/drive", -5.0
-                ),
+                # a mass that falls with the drive would be negative at a large one
+                amplitude("mass_rate", "kg/drive", "rise of the mass with the drive", "force/acceleration/drive", 0.0),
             ),
             _with_drive,
             {"mass": 0, "mass_rate": 1},

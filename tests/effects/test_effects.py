@@ -316,3 +316,10 @@ def test_a_reversal_moves_particles_once_the_flow_is_fast_enough(name: str) -> N
     # while the motion slows down nothing changes back
     slowing = late & (v * a < 0.0) & (np.abs(v) < 0.01)
     assert np.min(found[slowing]) > 1.4
+
+
+@pytest.mark.property
+def test_a_mass_that_changes_with_the_drive_is_never_negative() -> None:
+    """A negative mass that grows with the drive had been named for a shape that the library does not hold."""
+    form = next(form for form in damper_effects()["inertia"].forms if form.name == "mass-with-drive")
+    assert {parameter.name: parameter.lower for parameter in form.parameters} == {"mass": 0.0, "mass_rate": 0.0}
