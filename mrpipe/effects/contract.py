@@ -141,6 +141,9 @@ class Effect(Described):
         replaces the form if it is better on tests left out.
     law_of_drive
         Whether it limits the drive, so that a saturating law of the drive has a similar result.
+    delays_of_drive
+        Parameters that delay the drive [s]. Delays below one sampling interval are not named, because the course of
+        the command between two samples is not recorded.
     """
 
     acts_on: str
@@ -151,6 +154,7 @@ class Effect(Described):
     separated_by: Mapping[str, Separation] = field(default_factory=dict)
     refinements: tuple[EffectForm, ...] = ()
     law_of_drive: bool = False
+    delays_of_drive: tuple[str, ...] = ()
 
     def form(self, name: str) -> EffectForm:
         """Return one form by name."""

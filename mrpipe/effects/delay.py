@@ -149,6 +149,7 @@ EFFECT = Effect(
         ),
     ),
     needs=("varying-drive",),
+    delays_of_drive=("delay", "time_constant", "rise_time", "fall_time"),
     separated_by={"remanence": Separation("current steps up and down at constant velocity", ("steps",))},
     refinements=(
         # a chain of any number of lags is similar to a dead time followed by a second-order filter

@@ -10,6 +10,8 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import numpy as np
+
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
@@ -72,6 +74,9 @@ def without_idle(named: NamedEffects, *, lead: float) -> NamedEffects:
     Then these parameters lower the error, and not the effect. Each effect is therefore left out once, and the other
     parameters are fitted again from where they ended. The reason is empty if effects remain.
 
+    A delay of the drive below the sampling interval is not named either. The course of the command between two samples
+    is not recorded, so that a command which is held until the next sample seems to act later.
+
     Parameters
     ----------
     named
@@ -81,17 +86,29 @@ def without_idle(named: NamedEffects, *, lead: float) -> NamedEffects:
     """
     while named.selection.proven > 0 and named.places:
         chosen = named.selection.chosen
+        unresolved = [place for place in named.places if _below_sampling_interval(chosen, place)]
         fits = [
-            (with_own_laws(with_terms_in_order(chosen, other_places(chosen, place))), place) for place in named.places
+            (with_own_laws(with_terms_in_order(chosen, other_places(chosen, place))), place)
+            for place in unresolved or named.places
         ]
         best, place = min(fits, key=lambda item: item[0].chi_square)
-        if best.chi_square > lead * chosen.chi_square:
+        if not unresolved and best.chi_square > lead * chosen.chi_square:
             break
         named = named.without_one(place, best)
         if not named.selection.proven:
             name = chosen.problem.terms[place].effect.name
-            return replace(named, reason=f"no effect is named: the base form fits as well without {name}")
+            why = f"the base form fits as well without {name}"
+            if unresolved:
+                why = f"{name} would be shorter than the sampling interval, which these records do not resolve"
+            return replace(named, reason=f"no effect is named: {why}")
     return replace(named, reason="")
+
+
+def _below_sampling_interval(found: Fit, place: int) -> bool:
+    """Return whether a term only delays the drive, by less than the longest sampling interval of the records."""
+    effect, values = found.problem.terms[place].effect, found.term_values[place]
+    delays = [values[name] for name in effect.delays_of_drive if name in values]
+    return bool(delays) and max(delays) < float(np.max(found.problem.recordings.recorded_dt))
 
 
 def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:

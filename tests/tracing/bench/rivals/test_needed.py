@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from mrpipe.fitting.engine import fit
@@ -76,3 +79,22 @@ def test_of_two_effects_only_the_idle_one_is_dropped() -> None:
     found = without_idle(NamedEffects(selection, (None, None), declared=0), lead=1.25)
     assert [term.effect.name for term in found.selection.chosen.problem.terms] == ["accumulator"]
     assert (found.selection.proven, found.gains, found.reason) == (1, (None,), "")
+
+
+def test_a_delay_below_the_sampling_interval_is_not_named() -> None:
+    # with a lead of 0 no effect is idle, so that only the resolution of the records decides
+    chosen = fit_with_terms("", ("delay", "dead-time"))
+    short = replace(chosen, theta=np.append(chosen.theta[:-1], 0.2 * chosen.problem.recordings.recorded_dt.max()))
+    assert 0.0 < short.term_values[0]["delay"] < short.problem.recordings.recorded_dt.max()
+    found = without_idle(
+        NamedEffects(Selection(plain_fit(""), 1.0, (), short, proven=1), (None,), declared=0), lead=0.0
+    )
+    assert found.selection.chosen.problem.terms == ()
+    assert "shorter than the sampling interval" in found.reason
+
+
+def test_a_delay_that_the_records_resolve_is_named() -> None:
+    chosen = fit_with_terms("", ("delay", "dead-time"))
+    long = replace(chosen, theta=np.append(chosen.theta[:-1], 20.0 * chosen.problem.recordings.recorded_dt.max()))
+    named = NamedEffects(Selection(plain_fit(""), 1.0, (), long, proven=1), (None,), declared=0)
+    assert without_idle(named, lead=0.0) == named
