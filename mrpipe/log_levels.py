@@ -14,7 +14,7 @@ def errors_only(name: str) -> Iterator[None]:
     Parameters
     ----------
     name
-        Name of the package. Loggers of its modules count as well, because they may have levels of their own.
+        Name of the package. Loggers of its modules count as well, because some packages give each of them a level.
     """
     known = [key for key in logging.root.manager.loggerDict if key.startswith(f"{name}.")]
     loggers = [logging.getLogger(key) for key in (name, *known)]

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.property
 def test_the_levels_of_a_package_are_as_before_also_after_an_error() -> None:
     whole, module, other = (logging.getLogger(name) for name in ("a-package", "a-package.module", "a-package-2"))
     whole.setLevel(logging.DEBUG)
-    module.setLevel(logging.INFO)  # npTDMS gives its modules levels of their own
+    module.setLevel(logging.INFO)  # npTDMS gives each of its modules a level
     other.setLevel(logging.INFO)
     with pytest.raises(ValueError, match="unreadable"), errors_only("a-package"):
         for logger in (whole, module):
