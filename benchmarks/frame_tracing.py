@@ -194,7 +194,7 @@ def traced(case: Case, campaign: Campaign, truth: dict[str, Any]) -> dict[str, A
     from mrpipe.tracing.options import TracingOptions
     from mrpipe.tracing.structure.verdict import trace_structure
 
-    options = TracingOptions(refits=4, observation_filter=False, drive_unit=campaign.drive_unit or "A")
+    options = TracingOptions(refits=4, observation_filter=False)
     began = time.process_time()
     summary = trace_structure(
         [campaign], all_structural_effects(), damper_effects(), options, rng=np.random.default_rng(case.seed)

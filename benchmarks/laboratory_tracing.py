@@ -115,8 +115,7 @@ def trace(campaign: Path, seed: int) -> dict[str, Any]:
     tests = [item.test for item in prepare_campaign(load_campaign(campaign), PreparationOptions()).tests]
     damper_effects()
     began, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    options = TracingOptions(drive_unit=tests[0].drive_unit or "A")
-    summary = trace_campaign(tests, damper_effects(), [], options, rng=np.random.default_rng(seed)).summary
+    summary = trace_campaign(tests, damper_effects(), [], TracingOptions(), rng=np.random.default_rng(seed)).summary
     seconds, cpu = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_utime - used
     truth = json.loads(sealed_path(campaign).read_text(encoding="utf-8"))
     return {**judged(summary, truth), "seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}

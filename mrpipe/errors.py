@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mrpipe.words import shortest
+
 
 class MrpipeError(Exception):
     """Base of everything that mrpipe raises on purpose."""
@@ -18,7 +20,8 @@ class UserError(MrpipeError):
     Parameters
     ----------
     source
-        The file, directory or command-line option at fault.
+        The file, directory or command-line option at fault; a path within the working directory is shown relative to
+        it.
     where
         Key, row, column or test within it; empty where the whole source is meant.
     problem
@@ -28,7 +31,7 @@ class UserError(MrpipeError):
     """
 
     def __init__(self, source: str | Path, where: str, problem: str, remedy: str) -> None:
-        self.source = str(source)
+        self.source = shortest(source)
         self.where = where
         self.problem = problem
         self.remedy = remedy

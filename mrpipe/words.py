@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 
 def listed(names: Sequence[str]) -> str:
@@ -24,6 +26,19 @@ def shell_word(text: str | Path) -> str:
     return shlex.quote(str(text))
 
 
+def shortest(path: str | Path) -> str:
+    """Return a path relative to the working directory where it lies in it, else unchanged: `data/a.csv`.
+
+    The working directory itself is unchanged too, because a point names nothing.
+    """
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:  # it was removed
+        return str(path)
+    within = Path(path).is_relative_to(here) and here not in (Path(path), Path(here.anchor))
+    return str(Path(path).relative_to(here)) if within else str(path)
+
+
 def noun(count: int, word: str) -> str:
     """Return a regular noun in the number that a count requires: `test` for 1, else `tests`."""
     return word if count == 1 else f"{word}s"
@@ -41,7 +56,20 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def in_percent(ratio: float, decimals: int = 0, *, signed: bool = False) -> str:
+def number(value: Any, digits: int = 3) -> str:
+    """Return a number with some significant digits, without exponent where it can be read without; `-` for none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    # rounded first: 0.9999 with three digits is 1.00, not 1.000
+    places = digits - 1 - math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if -6 <= places <= 6:
+        return f"{round(value, places):.{max(places, 0)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def in_percent(ratio: float, decimals: int = 0, *, digits: int | None = None, signed: bool = False) -> str:
     """Return a ratio in percent, with a space before the sign as SI requires.
 
     Parameters
@@ -50,7 +78,13 @@ def in_percent(ratio: float, decimals: int = 0, *, signed: bool = False) -> str:
         The ratio [1].
     decimals
         Number of decimals.
+    digits
+        Number of significant digits, in place of a number of decimals; `-` is then returned for a ratio that is not
+        finite.
     signed
         Whether a positive number has a plus sign.
     """
+    if digits is not None:
+        shown = number(100.0 * ratio, digits)
+        return shown if shown == "-" else f"{'+' if signed and ratio > 0.0 else ''}{shown} %"
     return f"{100.0 * ratio:{'+' if signed else ''}.{decimals}f} %"

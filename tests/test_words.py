@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from mrpipe.words import counted, duration, in_percent, listed, noun, shell_word
+from mrpipe.errors import UserError
+from mrpipe.words import counted, duration, in_percent, listed, noun, shell_word, shortest
 
 pytestmark = pytest.mark.property
 
@@ -27,7 +30,6 @@ def test_times(seconds: float, text: str) -> None:
 
 def test_a_path_is_one_word_of_a_shell() -> None:
     import shlex
-    from pathlib import Path
 
     for path in ("runs/a", "Mein Projekt ß", "it's"):
         assert shlex.split(f"cd {shell_word(Path(path))}") == ["cd", path]
@@ -36,3 +38,32 @@ def test_a_path_is_one_word_of_a_shell() -> None:
 
 def test_percentages() -> None:
     assert [in_percent(0.934), in_percent(-0.05, 1), in_percent(0.5, signed=True)] == ["93 %", "-5.0 %", "+50 %"]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "digits", "text"),
+    [
+        (0.0549, 2, "5.5 %"),
+        (0.996, 2, "100 %"),
+        (12.34, 3, "1230 %"),
+        (0.0, 3, "0 %"),
+        (-0.5, 3, "-50.0 %"),
+        (float("nan"), 3, "-"),
+    ],
+)
+def test_percentages_with_significant_digits_have_no_exponent(ratio: float, digits: int, text: str) -> None:
+    assert in_percent(ratio, digits=digits) == text
+
+
+def test_a_path_within_the_working_directory_is_shown_relative_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside, outside = tmp_path / "project" / "data" / "a.csv", tmp_path / "measured" / "a.csv"
+    (tmp_path / "project").mkdir()
+    monkeypatch.chdir(tmp_path / "project")
+    assert shortest(inside) == "data/a.csv" and shortest(outside) == str(outside)
+    assert shortest(Path.cwd()) == str(tmp_path / "project")
+    assert UserError(inside, "row 3", "is empty", "fill it in").source == "data/a.csv"
+    assert UserError("simulate.excitation", "file", "is missing", "name it").source == "simulate.excitation"
+    monkeypatch.chdir("/")
+    assert shortest(outside) == str(outside), "everything lies within the root"

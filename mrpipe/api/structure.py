@@ -11,6 +11,7 @@ import numpy as np
 from mrpipe.campaigns import Campaign
 from mrpipe.modal.identification import FrameIdentification
 from mrpipe.structures import Frame
+from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,7 @@ class IdentifiedFrame:
 
     def __str__(self) -> str:
         rows = zip(self.summary["frequencies_hz"], self.summary["damping_ratios"], strict=True)
-        modes = ", ".join(f"{frequency:.3f} Hz ({100.0 * ratio:.2f} %)" for frequency, ratio in rows)
+        modes = ", ".join(f"{frequency:.3f} Hz ({in_percent(ratio, 2)})" for frequency, ratio in rows)
         return f"{self.frame.floors} floors; modes and damping: {modes}"
 
     def to_frame(self) -> pd.DataFrame:

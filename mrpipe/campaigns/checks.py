@@ -10,7 +10,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
-from mrpipe.words import counted
+from mrpipe.words import counted, in_percent
 
 LARGEST_SAMPLE = 1e30
 """Largest plausible sample [SI]; larger numbers are not measurements of any quantity."""
@@ -97,7 +97,7 @@ def find_clipping(test: Recording) -> list[str]:
         share = clipped_share(values)
         if share > 0.0:
             lines.append(
-                f"{channel} looks clipped: {100 * share:.2g} % of the samples sit exactly at "
+                f"{channel} looks clipped: {in_percent(share, digits=2)} of the samples sit exactly at "
                 f"{values.min():.4g} or {values.max():.4g}"
             )
     return lines

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.errors import UserError
-from mrpipe.words import counted
+from mrpipe.words import counted, in_percent
 
 RATE_TOLERANCE = 0.01
 """Largest relative difference between a stated rate and the clock."""
@@ -200,5 +200,5 @@ def _irregularities(time: FloatArray, rate: float, parts: tuple[tuple[int, int],
     if regular.size:
         jitter = float(np.sqrt(np.mean((regular - np.median(regular)) ** 2)))
         if jitter > JITTER_TOLERANCE:
-            findings.append(f"clock jitter of {100 * jitter:.2g} % of the sampling interval (RMS)")
+            findings.append(f"clock jitter of {in_percent(jitter, digits=2)} of the sampling interval (RMS)")
     return tuple(findings)

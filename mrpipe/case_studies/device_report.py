@@ -11,6 +11,7 @@ from mrpipe.case_studies.inverse import AMPLITUDE_M, FREQUENCY_HZ, ValidatedInve
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, MEASURED, figure_with_axes, label
+from mrpipe.words import in_percent
 
 VOLTAGES = (2.0, 4.0, 6.0)
 """Levels of the command in Figure 6.1 (a) [V]; the thesis prints them in A."""
@@ -46,7 +47,7 @@ def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse
             "inverse-validation",
             inverse_figure(inverse),
             "Voltage that the neural inverse estimates from velocity and force, and the voltage that gave this force. "
-            f"The error is {100.0 * inverse.nrmse:.2g} % of the RMS voltage (Figure 6.1 (b)).",
+            f"The error is {in_percent(inverse.nrmse, digits=2)} of the RMS voltage (Figure 6.1 (b)).",
         )
 
 

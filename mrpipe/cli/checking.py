@@ -78,8 +78,10 @@ def check_stages(loaded: LoadedConfig) -> None:
             stage.check(SettingsView(config, stage.settings, name))
 
 
-def own_effects(loaded: LoadedConfig) -> set[str]:
-    """Return the names of the effects in the user's files, read without running them.
+def own_effects(loaded: LoadedConfig) -> dict[str, str]:
+    """Return name -> class of the effects in the user's files, read without running them.
+
+    The name is empty if it is only known when the file is run; the class is `Effect`, `StructuralEffect`, or empty.
 
     Raises
     ------
@@ -90,10 +92,10 @@ def own_effects(loaded: LoadedConfig) -> set[str]:
 
     files = setting_named(loaded.config, "close_loop.effect_files")
     if not files:
-        return set()
-    from mrpipe.effects.file_reading import name_in_file
+        return {}
+    from mrpipe.effects.file_reading import effect_in_file
 
-    return {name_in_file(Path(path)) for path in files}
+    return {found.name: found.kind for found in map(effect_in_file, map(Path, files))}
 
 
 def _without_own_effects(loaded: LoadedConfig) -> RunSettings:
@@ -145,7 +147,7 @@ def check_headers(loaded: LoadedConfig) -> None:
                 raise not_found(file)
 
 
-def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> None:
+def require_known_effects(header: CampaignHeader, own: Mapping[str, str] | None = None) -> None:
     """Refuse unknown effects that a campaign declares.
 
     Parameters
@@ -153,18 +155,22 @@ def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> 
     header
         Head of the campaign.
     own
-        Names of the user's own effects; an empty name stands for one that is only known when its file is run.
+        Name -> class of the user's own effects, as :func:`own_effects` returns them.
 
     Raises
     ------
     UserError
-        If an effect is unknown; the message names the nearest known effect.
+        If an effect is unknown; the message names the nearest known effect. A structure cannot declare the user's own
+        effects on a damper.
     """
+    own = own or {}
     if not header.declared_effects or "" in own:
         return
     from mrpipe.effects.declared import require_known
 
-    require_known(header.declared_effects, effects_of_rig(header.rig) | set(own), header.file)
+    of_damper = {name for name, kind in own.items() if kind == "Effect" and header.rig == "shear-frame"}
+    known = effects_of_rig(header.rig) | (set(own) - of_damper)
+    require_known(header.declared_effects, known, header.file, of_damper)
 
 
 def require_known_laws(header: CampaignHeader) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
-from mrpipe.words import noun
+from mrpipe.words import in_percent, noun, number
 
 if TYPE_CHECKING:
     from mrpipe.reporting.compare import KeptRun
@@ -74,7 +74,6 @@ def _write(plot: Path, content: Mapping[str, Any], first: KeptRun, second: KeptR
 
 # --- for a person ----------------------------------------------------------------------------------------------------
 def _print(content: Mapping[str, Any]) -> None:
-    from mrpipe.reporting.words import number
 
     print(f"first:  {content['runs'][0]}")
     print(f"second: {content['runs'][1]}")
@@ -149,7 +148,7 @@ def _value(row: Mapping[str, Any], run: str) -> str:
 
 def _change(row: Mapping[str, Any]) -> str:
     relative = row["relative_difference"]
-    return "-" if relative is None else f"{100.0 * relative:+.3g} %"
+    return "-" if relative is None else in_percent(relative, digits=3, signed=True)
 
 
 def _readers(stages: Sequence[str]) -> str:

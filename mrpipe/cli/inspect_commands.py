@@ -11,7 +11,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
-from mrpipe.words import counted, listed, shell_word
+from mrpipe.words import counted, listed, shell_word, shortest
 
 if TYPE_CHECKING:
     from mrpipe.cli.checking import CheckResult
@@ -88,7 +88,7 @@ def check(
     without = checking.stages_without_data(loaded)
     result = checking.check_campaigns(loaded)
     count = counted(result.errors, "error")
-    named = f"campaign {options.campaign}" if options.campaign else str(_shortest(loaded.path))
+    named = f"campaign {options.campaign}" if options.campaign else shortest(loaded.path)
     stages = list(loaded.config.stages)
     if options.json:
         print_json(
@@ -107,7 +107,7 @@ def check(
         if not result.errors:
             words: list[str | Path] = []
             if options.config is not None or options.campaign is None:
-                words.append(options.config or _shortest(loaded.path))
+                words.append(options.config or shortest(loaded.path))
             words += ["--campaign", options.campaign] if options.campaign else []
             print("next: mrpipe run " + " ".join(shell_word(word) for word in words))
     if result.errors:
@@ -146,12 +146,6 @@ def _print_findings(result: CheckResult, without: Mapping[str, str]) -> None:
             print(f"    {item.severity}: {item.line}")
     for stage, campaign in without.items():
         print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
-
-
-def _shortest(path: Path) -> Path:
-    """Return a path relative to the working directory where it lies in it."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def _shown(value: Any) -> str | None:

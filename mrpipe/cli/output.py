@@ -77,7 +77,9 @@ def _lines(key: str, value: Any, depth: int) -> list[str]:
             return [f"{margin}{title}: {flat}"]
         return [f"{margin}{title}:", *inner]
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
-        return [f"{margin}{title}:", *_table(value[: 2 * _WIDEST], f"{margin}  ")]
+        more = len(value) - 2 * _WIDEST
+        omitted = [f"{margin}  … {more} more rows (--json prints all of them)"] if more > 0 else []
+        return [f"{margin}{title}:", *_table(value[: 2 * _WIDEST], f"{margin}  "), *omitted]
     if isinstance(value, list) and value and isinstance(value[0], list):
         return [f"{margin}{title}:", *(f"{margin}  {_short(row)}" for row in value)]
     return [f"{margin}{title}: {_short(value) or '-'}"]

@@ -54,6 +54,7 @@ def build_and_print(
     from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
     from mrpipe.reporting.headlines import in_brief
+    from mrpipe.reporting.prepared_rows import to_read
 
     with session(options) as pipeline:
         if options.campaign is not None:
@@ -82,7 +83,8 @@ def build_and_print(
         if brief:
             print_brief(f"{outcome.stage}{note}", brief, outcome.manifest.warnings)
         else:
-            print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
+            summary = to_read(outcome.stage, outcome.manifest.summary)
+            print_summary(f"{outcome.stage}{note}", summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}; next: mrpipe report {shell_word(pipeline.run_directory)}")
     _raise_failures(outcomes, pipeline)
 

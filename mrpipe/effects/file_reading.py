@@ -7,6 +7,7 @@ that trace effects (`run`, `close-loop`) and `check-effect` run them.
 from __future__ import annotations
 
 import ast
+from dataclasses import dataclass
 from pathlib import Path
 
 from mrpipe.dampers.user_file import check_is_file
@@ -16,8 +17,25 @@ REMEDY = "name a Python file that defines EFFECT"
 """Remedy for a file that defines no effect."""
 
 
-def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
-    """Return the name of the effect that a file defines, empty if the name is computed.
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect as the text of its file defines it.
+
+    Attributes
+    ----------
+    name
+        Its name; empty if the name is computed.
+    kind
+        Class of the effect: `Effect` for one on a damper, `StructuralEffect` for one of a structure; empty if the text
+        does not say.
+    """
+
+    name: str = ""
+    kind: str = ""
+
+
+def effect_in_file(path: Path, setting: str = "close_loop.effect_files") -> FoundEffect:
+    """Return name and class of the effect that a file defines.
 
     Parameters
     ----------
@@ -41,13 +59,20 @@ def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
     value = next((item for item in map(_effect, tree.body) if item is not None), None)
     if value is None:
         raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
-    if isinstance(value, ast.Call):
-        for keyword in value.keywords:
-            if keyword.arg == "name" and isinstance(keyword.value, ast.Constant):
-                return str(keyword.value.value)
-        if value.args and isinstance(value.args[0], ast.Constant):
-            return str(value.args[0].value)
-    return ""
+    return FoundEffect(_name(value), _kind(value.func)) if isinstance(value, ast.Call) else FoundEffect()
+
+
+def _name(call: ast.Call) -> str:
+    """Return the name that a call gives to an effect, empty if it is computed."""
+    for keyword in call.keywords:
+        if keyword.arg == "name" and isinstance(keyword.value, ast.Constant):
+            return str(keyword.value.value)
+    return str(call.args[0].value) if call.args and isinstance(call.args[0], ast.Constant) else ""
+
+
+def _kind(function: ast.expr) -> str:
+    """Return the name of a class as written, with or without its module: `Effect` for `contract.Effect`."""
+    return getattr(function, "attr", "") or getattr(function, "id", "")
 
 
 def _effect(statement: ast.stmt) -> ast.expr | None:

@@ -76,6 +76,17 @@ def load_effect_file(path: Path) -> Effect:
     return effect
 
 
+def names_of_damper_effects(files: Sequence[Path]) -> set[str]:
+    """Return the names of the effects of those files of the user that define one on a damper.
+
+    Raises
+    ------
+    UserError
+        If a file is missing or cannot be run.
+    """
+    return {item.name for item in map(effect_of_file, files) if isinstance(item, Effect)}
+
+
 def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Effect]:
     """Return the damper effects of these names (all if none is given), and those of the user's files.
 

@@ -25,6 +25,7 @@ from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
+from mrpipe.words import in_percent
 
 T = TypeVar("T")
 
@@ -174,13 +175,13 @@ def reason_of_choice(chosen: JudgedFit, judged: Sequence[JudgedFit]) -> str:
     if not chosen.left_out_nrmse:
         return f"{name} is the form that identify_damper.form names."
     best = min(judged, key=lambda item: item.typical_left_out_nrmse)
-    error = 100.0 * chosen.typical_left_out_nrmse
+    error = in_percent(chosen.typical_left_out_nrmse, 1)
     if best is chosen:
-        return f"{name} is taken because it has the smallest error on tests left out ({error:.1f} %)."
+        return f"{name} is taken because it has the smallest error on tests left out ({error})."
     return (
         f"{name} is taken because it has the fewest parameters ({len(chosen.fit.names)}) of the forms whose error on "
-        f"tests left out ({error:.1f} %) lies within one standard error of the best ({best.fit.form.name}, "
-        f"{100.0 * best.typical_left_out_nrmse:.1f} %)."
+        f"tests left out ({error}) lies within one standard error of the best ({best.fit.form.name}, "
+        f"{in_percent(best.typical_left_out_nrmse, 1)})."
     )
 
 
@@ -355,11 +356,11 @@ def _settled_shape(found: FormFit, options: FitOptions, unit: str) -> FormFit:
         value = found.values["gamma_share"]
         note = (
             f"gamma_share ended at its bound {value:.3g} and is kept there, because gamma = beta (0.5) would raise the "
-            f"error by {100.0 * gain:.0f} %"
+            f"error by {in_percent(gain)}"
         )
         return replace(found, notes=(note,))
     note = (
-        f"gamma_share ended at its bound, which changes the error by only {100.0 * abs(gain):.1f} %: gamma = beta is "
+        f"gamma_share ended at its bound, which changes the error by only {in_percent(abs(gain), 1)}: gamma = beta is "
         "taken (0.5)"
     )
     return replace(plain, notes=(note,))

@@ -23,6 +23,7 @@ from mrpipe.dampers.laws import Law, LawShape, for_blocks
 from mrpipe.fitting.drive_cells import Cells, cells_of
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.solution import bounded_solution
+from mrpipe.words import in_percent
 
 SCALE_SHARES = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.7, 2.5, 5.0)
 """Scales of saturating laws that are tried first, as shares of the largest drive."""
@@ -242,7 +243,7 @@ def _reason(chosen: tuple[LawShape, LawShape], judged: Sequence[Judged], levels:
     error = _typical(item.left_out) or 0.0
     return (
         f"{names}: the fewest coefficients among laws that predict levels left out equally well "
-        f"(error {100.0 * error:.1f} %)"
+        f"(error {in_percent(error, 1)})"
     )
 
 

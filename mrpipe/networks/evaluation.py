@@ -11,6 +11,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.networks.assembly import History, Samples, samples
 from mrpipe.networks.network import Network
 from mrpipe.signals.reversals import last_reversal
+from mrpipe.words import in_percent
 
 REGIMES = ("pre_yield", "reversal", "post_yield")
 """The regimes of :func:`regimes_of`, in the order of their numbers."""
@@ -225,8 +226,9 @@ class Judgement:
     @property
     def finding(self) -> str:
         """Message on the validation tests for the user; empty if there is none."""
-        share = 100.0 * self.outside_training_range
-        return f"{share:.1f} % of the validation samples lie outside the training range" if share > 1.0 else ""
+        share = self.outside_training_range
+        outside = "of the validation samples lie outside the training range"
+        return f"{in_percent(share, 1)} {outside}" if share > 0.01 else ""
 
     def rows(self, unit: str, span: float | None = None) -> list[dict[str, str | float | int]]:
         """Return the table of errors, one row for each group of samples.

@@ -12,6 +12,7 @@ from mrpipe.networks.assembly import History, samples
 from mrpipe.networks.evaluation import ErrorFigures, by_regime, error_figures, regimes_of
 from mrpipe.networks.network import Network
 from mrpipe.networks.options import ViscousEmulationOptions
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -188,12 +189,12 @@ class TrackingJudgement:
     @property
     def finding(self) -> str:
         """Message for the user; empty if there is none."""
-        share = 100.0 * self.viscous.outside_training_range
-        if share <= 1.0:
+        share = self.viscous.outside_training_range
+        if share <= 0.01:
             return ""
         return (
-            f"the viscous damping to be emulated lies {share:.1f} % of the time outside the training range: lower "
-            "train_inverse.viscous.amplitude_m, frequency_hz or damping_n_s_m"
+            f"the viscous damping to be emulated lies {in_percent(share, 1)} of the time outside the training range: "
+            "lower train_inverse.viscous.amplitude_m, frequency_hz or damping_n_s_m"
         )
 
     def summary(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mrpipe.artifacts import Progress
+from mrpipe.words import in_percent
 
 LOGGER_NAME = "mrpipe"
 _LOG_EVERY_S = 10.0
@@ -140,6 +141,6 @@ def _lines(stage: str, logger: logging.Logger) -> Progress:
             left = (now - started) * (1 - fraction) / fraction if fraction > 0.02 else float("nan")
             # a stage that knows its remaining time reports it
             remaining = f" (about {left:.0f} s left)" if left == left and not _LEFT.search(text) else ""
-            logger.info("%s: %.0f %%%s: %s", stage, 100 * fraction, remaining, text)
+            logger.info("%s: %s%s: %s", stage, in_percent(fraction), remaining, text)
 
     return progress

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
 from mrpipe.reporting.traced_words import exchange_in_words, numbers_of, unproven_in_words
-from mrpipe.words import listed
+from mrpipe.reporting.words import percent
+from mrpipe.words import in_percent, listed
 
 AFTER = COLOURS[0]
 """Colour of the model with the effects."""
@@ -55,11 +56,11 @@ def residual_location(location: Mapping[str, Mapping[str, float]]) -> Figure:
             axis.barh(-row, share, 0.62, left=left, color=COLOURS[index], alpha=0.85)
             if share > 0.09:
                 axis.text(
-                    left + 0.5 * share, -row, f"{text} {100.0 * share:.0f} %", ha="center", va="center", fontsize=8,
+                    left + 0.5 * share, -row, f"{text} {in_percent(share)}", ha="center", va="center", fontsize=8,
                     color="white",
                 )  # fmt: skip
             elif share >= 0.005:
-                small.append(f"{text} {100.0 * share:.0f} %")
+                small.append(f"{text} {in_percent(share)}")
             left += share
         if small:
             axis.text(1.01, -row, "\n".join(small), va="center", fontsize=8)
@@ -123,7 +124,7 @@ def candidate_ranking(
     bound = [bool(item.get("at_bound")) for item in candidates]
     axis.barh(place, shares, 0.7, color=[COLOURS[7] if stuck else AFTER for stuck in bound])
     for y, share, item, stuck in zip(place, shares, candidates, bound, strict=True):
-        note = f" {100.0 * share:.0f} %, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
+        note = f" {in_percent(share)}, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
         inside = share > 0.75
         # a text in front of a line has a white ground, so that it can be read
         ground = None if inside else {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
@@ -235,7 +236,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         )
     parts = [*([exchange] if exchange else []), *(_effect_in_words(effect) for effect in effects)]
     share = summary["ceiling"]["recovered"]
-    recovers = f"recovers {100 * share:.0f} % of what a flexible model could"
+    recovers = f"recovers {in_percent(share)} of what a flexible model could"
     added_up = "Added to the model, it" if len(effects) == 1 else "Added to the model, they"
     if len(effects) > 1:
         recovers = recovers.replace("recovers", "recover", 1)
@@ -286,4 +287,4 @@ def _effect_in_words(effect: Mapping[str, Any]) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.1 else f"{100.0 * share:.1f} %"
+    return percent(share) if share < 0.1 else in_percent(share, 1)

@@ -26,6 +26,7 @@ from mrpipe.reporting.headlines import open_questions
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.traced_words import shares_in_words, shown_candidates
 from mrpipe.tracing.bench.verdict.summary import Tracing
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ def _identified(sink: Sink, summary: Mapping[str, Any]) -> None:
         return
     sink.text(
         f"The damper of identify-damper ({found['form']}) misses the force on the same validation samples by "
-        f"{100 * found['nrmse']:.1f} %, the declared model ({summary['model']}) by "
-        f"{100 * summary['before']['nrmse']:.1f} %. {found['why']}"
+        f"{in_percent(found['nrmse'], 1)}, the declared model ({summary['model']}) by "
+        f"{in_percent(summary['before']['nrmse'], 1)}. {found['why']}"
     )
     rows = [
         {"number": name.replace("_", " "), "identify-damper": item["value"], "before": item["before"]}

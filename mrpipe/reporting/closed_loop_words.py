@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.words import listed
+from mrpipe.words import in_percent, listed
 
 WHEN = ("before", "after", "recalibrated")
 """How a law was simulated."""
@@ -155,7 +155,7 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
             "Retuning for the effect changes the largest RMS top displacement of no law by more than 1 %: the effect "
             "matters for prediction, not for control."
         )
-    named = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in changed.items())
+    named = ", ".join(f"{law} {in_percent(change, signed=True)}" for law, change in changed.items())
     return (
         f"On the damper with the effect it changes the largest RMS top displacement: {named}; the other laws stay "
         "within 1 %."
@@ -163,4 +163,4 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.1f} %"
+    return "-" if value is None else in_percent(value, 1)

@@ -15,7 +15,7 @@ from mrpipe.artifacts import atomic_path, atomic_write_text
 from mrpipe.reporting.compare import KeptRun
 from mrpipe.reporting.facts import LAW_STAGE
 from mrpipe.reporting.style import AFTER, MODEL, as_svg, figure_with_axes, label
-from mrpipe.reporting.words import number
+from mrpipe.words import number
 
 _COLOURS = (AFTER, MODEL)
 _DATA_KEYS = ("campaign", "path", "sha256")

@@ -11,6 +11,7 @@ import pandas as pd
 from mrpipe.reporting import modal as figures
 from mrpipe.reporting.sink import Sink
 from mrpipe.structures import Frame
+from mrpipe.words import in_percent
 
 _LARGEST_TABLE = 12
 
@@ -22,7 +23,7 @@ def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
         sink.text(
             f"It was reduced from {summary['full_degrees_of_freedom']} degrees of freedom. The largest error of the "
             f"response to ground motion up to {summary['reduction_band_high_hz']:.3g} Hz is "
-            f"{100.0 * summary['reduction_error']:.3g} % of the largest response."
+            f"{in_percent(summary['reduction_error'], digits=3)} of the largest response."
         )
     rows = {
         "mode": summary["mode_numbers"],

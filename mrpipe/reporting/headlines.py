@@ -7,7 +7,7 @@ from typing import Any
 
 from mrpipe.reporting.traced_words import exchanged_form, numbers_of
 from mrpipe.reporting.words import percent
-from mrpipe.words import counted, duration, listed
+from mrpipe.words import counted, duration, in_percent, listed
 
 
 def headline(stage: str, summary: Mapping[str, Any]) -> str:
@@ -136,9 +136,9 @@ def weak_network(summaries: Mapping[str, Mapping[str, Any]]) -> str:
     if not error or not reference or error < FAR_WORSE * reference:
         return ""
     return (
-        f"The forward network misses the validation tests by {100.0 * error:.2g} % of the RMS force, "
+        f"The forward network misses the validation tests by {percent(error)} of the RMS force, "
         f"{error / reference:.2g} times the error of the damper model {damper.get('form', '')} "
-        f"({100.0 * reference:.2g} %). {_why_weak(network)}Use the damper model for predictions."
+        f"({percent(reference)}). {_why_weak(network)}Use the damper model for predictions."
     )
 
 
@@ -149,8 +149,9 @@ def _why_weak(network: Mapping[str, Any]) -> str:
     tests, changing = network.get("training_tests", 0), network.get("training_tests_with_varying_drive", 0)
     if steady and varying and varying > FAR_WORSE * steady:
         found.append(
-            f"The error is {100.0 * varying:.2g} % in tests whose drive changes and {100.0 * steady:.2g} % in the "
-            f"others. The drive changes in only {changing} of {tests} training tests, so record more such tests."
+            f"The error is {percent(varying)} in tests whose drive changes and "
+            f"{percent(steady)} in the others. The drive changes in only {changing} of {tests} training tests, so "
+            "record more such tests."
         )
     rate = float(network.get("sampling_rate_hz") or 0.0)
     window = network.get("past_values", 0) / rate if rate > 0.0 else 0.0
@@ -186,9 +187,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
         shown = f": {numbers}" if numbers else ""
         place = f" at {effect['place']}" if effect.get("place") else ""
         lines.append(f"effect {effect['name']}{place} ({effect['form']}{shown}{confidence}{rivals})")
-    recovered = (
-        f", {100.0 * summary['ceiling']['recovered']:.0f} % of what is recoverable" if summary["effects"] else ""
-    )
+    recovered = f", {in_percent(summary['ceiling']['recovered'])} of what is recoverable" if summary["effects"] else ""
     lines.append(f"error on validation tests: NRMSE {before} before, {after} after (noise floor {floor}{recovered})")
     unexplained = summary["unexplained"]
     if unexplained["structured"]:

@@ -22,9 +22,9 @@ from mrpipe.artifacts import atomic_write_text
 from mrpipe.reporting.facts import ReportStage, RunFacts
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.front.statements import statements
-from mrpipe.reporting.words import number, readable_unit
+from mrpipe.reporting.words import readable_unit
 from mrpipe.reporting.writer import Section
-from mrpipe.words import listed
+from mrpipe.words import listed, number
 
 __all__ = ["ReportStage", "RunFacts", "first_screen", "write_report"]
 

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
 from mrpipe.simulation.resonance import Curves
+from mrpipe.words import in_percent
 
 STATED = ("rms_x_top_m", "rms_a1_m_s2")
 """Largest values that the text states."""
@@ -29,7 +30,7 @@ def describe(sink: Sink, law: str, curves: Curves) -> None:
         f"floor is {1e3 * nominal.peak('rms_x_top_m'):.1f} mm under a harmonic base acceleration of "
         f"{nominal.base_amplitude_m_s2:.3g} m/s^2. The largest RMS acceleration of floor 1 over the band is "
         f"{nominal.peak('rms_a1_m_s2'):.2f} m/s^2. The standard error of these values is "
-        f"{100.0 * max(nominal.peak_error(name) / nominal.peak(name) for name in STATED):.2f} % or less."
+        f"{in_percent(max(nominal.peak_error(name) / nominal.peak(name) for name in STATED), 2)} or less."
     )
     rows = pd.DataFrame(curves.as_json()["amplitudes"])
     stated = [name for name in rows if not str(name).startswith("standard_error")]

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.reporting.words import percent
 
 MAPS_CAPTION = (
     "Mean residual shear force over drift and its rate, storey by storey: friction shows as two halves (sign of the "
@@ -64,8 +65,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     """Return a paragraph that says what was found, in plain words."""
     before, after = summary["before"]["nrmse"], summary["after"]["nrmse"]
     start = (
-        f"On validation tests the model {summary['model']} misses {100 * before:.2g} % of the quantity that is "
-        f"compared ({summary['quantity']}); sensor noise alone is {100 * summary['noise_floor_nrmse']:.2g} %."
+        f"On validation tests the model {summary['model']} misses {percent(before)} of the quantity "
+        f"that is compared ({summary['quantity']}); sensor noise alone is {percent(summary['noise_floor_nrmse'])}."
     )
     if not summary["residual"]["structured"]:
         return f"{start} The rest is noise: nothing is missing."
@@ -89,7 +90,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         if effect["tied_with"]:
             tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
             parts.append(f"Not separated from {', '.join(effect['tied_with'])} by these tests ({tests}).")
-    end = f"With it the error is {100 * after:.2g} %."
+    end = f"With it the error is {percent(after)}."
     if summary["unexplained"]["structured"]:
         end += " Something is still unexplained."
     return f"{start} The model lacks {' '.join(parts)} {end}"

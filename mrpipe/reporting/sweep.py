@@ -13,6 +13,7 @@ from mrpipe.networks.findings import WORTHWHILE, Finding, score
 from mrpipe.networks.sweep import Outcome, SweepRun
 from mrpipe.reporting import networks as figures
 from mrpipe.reporting.sink import Sink
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def describe(sink: Sink, result: SweepResult) -> None:
         f"tests that were left out of its fit, in {len(result.run.held_out)} splits. Every second "
         "split leaves out all tests of one motion together, so that unseen motions count too. Chosen is the smallest "
         "network that is worse than the best by less than the standard error of their ratio and by less than "
-        f"{100.0 * WORTHWHILE:.0f} %: {chosen.candidate.label}."
+        f"{in_percent(WORTHWHILE)}: {chosen.candidate.label}."
     )
     sink.table(
         "findings",

@@ -11,6 +11,8 @@ from mrpipe.networks.training import Trained
 from mrpipe.reporting import networks as figures
 from mrpipe.reporting import training
 from mrpipe.reporting.sink import Sink
+from mrpipe.reporting.words import percent
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,8 @@ def describe(sink: Sink, result: TrainedInverse) -> None:
     if result.signed is not None:
         sink.text(
             f"A network of signed values (short training) estimates a negative drive in "
-            f"{100 * result.signed.negative_share:.1f} % of the samples; its RMS error is "
-            f"{100.0 * result.signed.pooled.rms / result.drive_range:.2g} % of the drive range."
+            f"{in_percent(result.signed.negative_share, 1)} of the samples; its RMS error is "
+            f"{percent(result.signed.pooled.rms / result.drive_range)} of the drive range."
         )
     if result.tracking is None:
         sink.text("There is no forward network, so round trip and emulation of viscous damping are left out.")

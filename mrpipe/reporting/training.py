@@ -9,6 +9,7 @@ from mrpipe.networks.network import Network
 from mrpipe.networks.training import Trained
 from mrpipe.reporting import networks as figures
 from mrpipe.reporting.sink import Sink
+from mrpipe.reporting.words import percent
 from mrpipe.words import counted
 
 
@@ -26,8 +27,8 @@ def describe(sink: Sink, trained: Trained, judged: Judgement, unit: str, span: f
     """
     network, pooled = trained.network, judged.pooled
     spread = [start.held_out_nrmse for start in trained.starts]
-    size = f"{pooled.nrmse:.4f} (NRMSE)" if span is None else f"{100.0 * pooled.rms / span:.2g} % of the drive range"
-    rival = f"{judged.linear.nrmse:.3f}" if span is None else f"{100.0 * judged.linear.rms / span:.2g} %"
+    size = f"{pooled.nrmse:.4f} (NRMSE)" if span is None else f"{percent(pooled.rms / span)} of the drive range"
+    rival = f"{judged.linear.nrmse:.3f}" if span is None else percent(judged.linear.rms / span)
     sink.text(
         f"Network {network.architecture} with {network.parameters} parameters "
         f"({'with' if network.has_biases else 'without'} biases): {_taken(network)} of {len(trained.starts)} starts, "

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+
+from mrpipe.words import in_percent, number
 
 PREFIXES = ((1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"))
 _SCALED = {"m", "N", "s", "N/m", "N*s/m", "N s/m", "m/s", "kg/s", "N*s^2/m^2"}
 
 
-def percent(value: Any, digits: int = 2) -> str:
+def percent(value: float | None, digits: int = 2) -> str:
     """Return a ratio as a percentage with some significant digits; `-` where it is not known."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    return f"{number(100.0 * value, digits)} %"
-
-
-def number(value: Any, digits: int = 3) -> str:
-    """Return a number with some significant digits, without exponent where it can be read without; `-` for none."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    if value == 0.0:
-        return "0"
-    # rounded first: 0.9999 with three digits is 1.00, not 1.000
-    places = digits - 1 - math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
-    if -6 <= places <= 6:
-        return f"{round(value, places):.{max(places, 0)}f}"
-    return f"{value:.{digits - 1}e}"
+    return "-" if value is None else in_percent(value, digits=digits)
 
 
 def readable_unit(unit: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.words import in_percent
 
 HARDLY = 0.02
 """Changes of a signal over its RMS value up to which it counts as constant with the noise of a sensor."""
@@ -37,8 +38,8 @@ def doubt_about_fit(nrmse: float, fit_percent: float, quantity: str) -> str | No
         if share > HARDLY:
             return None
         return (
-            f"the {quantity} of the validation tests changes by {100.0 * share:.2g} % of its RMS value only; {what}, "
-            f"so that it says little: {remedy}"
+            f"the {quantity} of the validation tests changes by {in_percent(share, digits=2)} of its RMS value "
+            f"only; {what}, so that it says little: {remedy}"
         )
     if np.isfinite(nrmse):
         return f"the {quantity} of the validation tests is constant; {what}, so that it is not defined: {remedy}"

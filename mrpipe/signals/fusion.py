@@ -21,6 +21,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.signals.filters import advance
 from mrpipe.signals.spectra import averaged
+from mrpipe.words import in_percent
 
 LATEST_S = 0.02
 """Largest delay between the two sensors that is searched [s]."""
@@ -105,7 +106,7 @@ class SensorAgreement:
         """Finding for a user who takes the motion from the displacement alone."""
         return (
             f"above {self.crossover_hz:.3g} Hz the accelerometer has less noise than the displacement sensor, and "
-            f"{100.0 * self.velocity_share:.0f} % of the power of the velocity lies there: consider "
+            f"{in_percent(self.velocity_share)} of the power of the velocity lies there: consider "
             "prepare.motion=displacement-and-acceleration"
         )
 

@@ -21,6 +21,7 @@ from mrpipe.simulation.response_curve import ResponseCurve, response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.settings import ResonanceSettings
 from mrpipe.simulation.steady_state import CurveOptions, Run
+from mrpipe.words import in_percent
 
 BAND = (0.75, 1.2)
 """Default band: lowest frequency relative to the natural frequency of the target mode without damper force, and highest
@@ -182,6 +183,6 @@ def _warnings(curves: Sequence[ResponseCurve], band: tuple[float, float], standa
         if error > WARNED * standard_error:
             found.append(
                 f"{level} the response does not become periodic, and the standard error of a largest value is "
-                f"{100.0 * error:.1f} %; raise resonance.most_averaged_cycles for more accurate ones"
+                f"{in_percent(error, 1)}; raise resonance.most_averaged_cycles for more accurate ones"
             )
     return found

@@ -19,6 +19,7 @@ from mrpipe.control.kernel import COMMAND_DISPLACEMENT, COMMAND_FORCE, COMMAND_S
 from mrpipe.networks.network import Network
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
+from mrpipe.words import in_percent
 
 MARGIN = 0.02
 """Share of the range beyond its ends that still counts as within, because noise at the ends is not an extrapolation."""
@@ -60,7 +61,7 @@ class InputRange:
             asked, known = f"up to {high:.3g} {unit}", f"{known_high:.3g}"
         else:
             asked, known = f"down to {low:.3g} {unit}", f"{known_low:.3g}"
-        return f"{name} {asked} (known to {known}) {100.0 * self.outside_share:.2g} % of the time"
+        return f"{name} {asked} (known to {known}) {in_percent(self.outside_share, digits=2)} of the time"
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,8 @@ class RangeCheck:
         if self.outside_share < WORTH_A_WARNING:
             return ""
         left = [item.words(name) for name, item in self.inputs.items() if item.outside_share >= WORTH_A_WARNING / 10.0]
-        return f"the {self.what} extrapolates {100.0 * self.outside_share:.2g} % of the time: " + "; ".join(left)
+        share = in_percent(self.outside_share, digits=2)
+        return f"the {self.what} extrapolates {share} of the time: " + "; ".join(left)
 
     def as_json(self) -> dict[str, Any]:
         """Return the check as plain values in SI, with units in the keys."""

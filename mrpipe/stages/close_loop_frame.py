@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.effects.declared import declared_effects
-    from mrpipe.effects.library import damper_effects
+    from mrpipe.effects.library import damper_effects, names_of_damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
     from mrpipe.reporting import close_loop_frame as section
     from mrpipe.tracing.options import tracing_options
@@ -40,9 +40,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             "write frame: {floor_masses_kg: [...]} in campaign.yaml"
         )
     library = structural_effects(settings.candidates, settings.effect_files)
+    own = names_of_damper_effects(settings.effect_files)
     for campaign in campaigns:
         known = {**all_structural_effects(), **damper_effects(), **library}
-        declared_effects(campaign.declared_effects, known, campaign.file)
+        declared_effects(campaign.declared_effects, known, campaign.file, own)
     asked = tracing_options(settings)
     # few long tests: fewer forms are refitted, and nothing filtered their force
     options = asked.changed(refits=min(settings.refits, 4), observation_filter=False, unattributed=False)

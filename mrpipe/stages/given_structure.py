@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
@@ -27,7 +28,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         context.warn(
             f"the structure was reduced from {full.floors} to {reduced.frame.floors} degrees of freedom "
             f"({settings.reduction.method}); the largest error of the response to ground motion up to "
-            f"{reduced.band_high_hz:.3g} Hz is {100.0 * reduced.error:.3g} % of the largest response"
+            f"{reduced.band_high_hz:.3g} Hz is {in_percent(reduced.error, digits=3)} of the largest response"
         )
     summary = given_summary(full, reduced, floor_heights(settings, read_matrix))
     with context.write("frame.h5") as artifact:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mrpipe.thesis.entries import Entry
+from mrpipe.words import in_percent
 
 Number = float | Sequence[float] | str
 Verdict = Literal["holds", "differs", "cannot-be-recomputed"]
@@ -164,6 +165,6 @@ def judge(entry: Entry, outcome: Outcome) -> Claim:
     else:
         apart = deviation(entry.printed, value)
         agrees = apart <= entry.tolerance
-        said = f"deviates by {100 * apart:.3g} %"
+        said = f"deviates by {in_percent(apart, digits=3)}"
     why = "" if agrees else "; ".join(part for part in (said, outcome.why, entry.reason) if part)
     return Claim(entry, value, "holds" if agrees else "differs", why, outcome.by)

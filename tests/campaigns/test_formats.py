@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import logging
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -289,15 +290,18 @@ def test_a_campaign_of_mixed_formats(tmp_path: Path) -> None:
 
 
 @pytest.mark.golden
-def test_a_tdms_file_that_was_cut_off_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_tdms_file_that_was_cut_off_is_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     nptdms = pytest.importorskip("nptdms")
     path = tmp_path / "cut.tdms"
     with nptdms.TdmsWriter(str(path)) as writer:
         writer.write_segment([nptdms.ChannelObject("g", name, FORCE) for name in ("x", "F")])
     path.write_bytes(path.read_bytes()[:-1000])
+    loggers = [logging.getLogger(name) for name in ("nptdms", "nptdms.reader")]
+    before = [logger.level for logger in loggers]
     with pytest.raises(UserError, match=r"cut.tdms: is cut off: its last segment is shorter"):
         open_data_file(path)
-    assert capfd.readouterr().err == ""
+    assert [logger.level for logger in loggers] == before, "a reader must not change what a program of the user logs"
+    assert caplog.records == []
 
 
 @pytest.mark.golden

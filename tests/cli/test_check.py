@@ -15,7 +15,7 @@ import yaml
 from mrpipe.campaigns import TestFile, write_campaign
 from mrpipe.cli import run
 from mrpipe.config.loader import load_config
-from mrpipe.errors import StageSkipped
+from mrpipe.errors import StageSkipped, UserError
 from mrpipe.stages import close_loop_frame
 from tests.campaigns.plausibility.rig import sound_tests
 
@@ -305,6 +305,30 @@ def test_a_structure_without_masses_is_not_traced_and_the_rest_goes_on(
     (tmp_path / "data" / "campaign.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     with pytest.raises(StageSkipped, match="or not all of them"):
         close_loop_frame.variant(load_config(config).config).run(context)  # type: ignore[union-attr, arg-type]
+
+
+@pytest.mark.golden
+def test_a_users_effect_on_a_damper_that_a_structure_declares_is_refused_as_by_the_stage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = Path(__file__).parents[2] / "docs" / "examples" / "seal_squeeze.py"
+    config = tower(tmp_path, declared_effects=["joint-friction", "seal-squeeze"])
+    setting = f"close_loop: {{effect_files: ['{own}']}}\n"
+    config.write_text(config.read_text(encoding="utf-8") + setting, encoding="utf-8")
+    status, _, err = checked(capsys, str(config))
+    assert (
+        status == 2 and "declared_effects[1]: 'seal-squeeze' of close_loop.effect_files is an effect on a damper" in err
+    )
+    settings = load_config(config).config
+    context = SimpleNamespace(settings=settings, inputs={"campaign:frame": tmp_path / "data"}, warn=print)
+    with pytest.raises(UserError) as caught:
+        close_loop_frame.variant(settings).run(context)  # type: ignore[union-attr, arg-type]
+    assert str(caught.value) in err
+    # a file that is not declared may be there for a bench campaign
+    content = yaml.safe_load((tmp_path / "data" / "campaign.yaml").read_text(encoding="utf-8"))
+    content["declared_effects"] = ["joint-friction"]
+    (tmp_path / "data" / "campaign.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    assert checked(capsys, str(config))[0] == 0
 
 
 @pytest.mark.property

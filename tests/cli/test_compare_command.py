@@ -223,7 +223,7 @@ def test_a_person_reads_tables(make_run: MakeRun, capsys: pytest.CaptureFixture[
     assert run(["compare", str(first), str(second)]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["prepare.cutoff_hz", "100", "80", "prepare"] in lines
-    assert ["rms_x_top_m", "0.024", "0.018", "-25", "%"] in lines
+    assert ["rms_x_top_m", "0.024", "0.018", "-25.0", "%"] in lines
     assert ["data:", "no", "differences"] in lines
 
 

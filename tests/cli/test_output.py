@@ -65,3 +65,10 @@ def test_what_is_nested_more_deeply_is_no_table(capsys: pytest.CaptureFixture[st
     content = {"training_range": {"network": {"inputs": seen}, "damper": {"inputs": seen}}}
     inputs = ["      inputs:", "        velocity: smallest [m/s] 0, largest [m/s] 0.2"]
     assert printed(content, capsys) == ["  training range:", "    network:", *inputs, "    damper:", *inputs]
+
+
+@pytest.mark.golden
+def test_a_long_table_says_how_many_rows_it_omits(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed({"tests": [{"name": f"t{k}"} for k in range(16)]}, capsys)[-1] == "    t15"
+    lines = printed({"tests": [{"name": f"t{k}"} for k in range(19)]}, capsys)
+    assert lines[-1] == "    … 3 more rows (--json prints all of them)"

@@ -67,7 +67,7 @@ def test_differences_of_the_validation_tests_are_said_first(summary: dict[str, A
     }
     text = in_plain_words(differs)
     assert "v8: the measured force is 0.001 times the simulated one." in text
-    assert "75.0 % of the samples) the error is 2 % before and 1 % after" in text
+    assert "75.0 % of the samples) the error is 2.0 % before and 1.0 % after" in text
     assert "the error is 1.2 %." in text
     assert "Remanence" in text
 

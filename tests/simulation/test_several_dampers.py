@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.control.central import CENTRAL, Sensors, central_regulator
@@ -75,6 +76,43 @@ def test_two_linear_devices_are_a_linear_structure() -> None:
     expected = linear_response(inside, 2.0 * GROUND, INTERVAL).displacement
     np.testing.assert_allclose(found.first.displacement, expected, atol=2e-5 * np.abs(expected).max())
     assert found.energy_balance_error < 1e-5
+
+
+@pytest.mark.oracle
+def test_two_dampers_at_different_drives_equal_an_integrator_of_scipy() -> None:
+    """Structure, Bouc-Wen (2.1), (2.2) and lag of the drive of each damper, written out and integrated with LSODA."""
+    drives = (0.0, 1.0)
+    dampers = [
+        LoopDamper(name, position, MODEL.chain(), build_controller(law, Gains(), ControllerOptions(drive_limit=1.0)))
+        for name, law, position in (("a", "passive-off", FIRST), ("b", "passive-on", SECOND))
+    ]
+    options = LoopOptions(plant_rate_hz=8000.0, record_rate_hz=50.0)
+    found = simulate_dampers(FRAME, dampers, SHAKING, options)
+    numbers = MODEL.parameters
+
+    def force(z: float, u: float, v: float) -> float:
+        yielded = sum(numbers[f"yield_force_{letter}"] * u**power for power, letter in enumerate("abcd"))
+        return float(yielded * z + (numbers["c0_a"] + numbers["c0_b"] * u) * v)
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        x, v, z, u = y[:3], y[3:6], y[6:8], y[8:10]
+        strokes = (v[0], v[2] - v[1])  # damper a stands on the ground, b between floors 2 and 3
+        of_a, of_b = (force(z[k], u[k], strokes[k]) for k in range(2))
+        pull = np.array([-of_a, of_b, -of_b])
+        ground = 2.0 * np.interp(t, TIME, GROUND)
+        acceleration = np.linalg.solve(FRAME.mass, pull - FRAME.damping @ v - FRAME.stiffness @ x) - ground
+        rates = [
+            (w - 0.5 * abs(w) * z[k] * abs(z[k]) - 0.5 * w * z[k] ** 2) / numbers["yield_displacement"]
+            for k, w in enumerate(strokes)
+        ]
+        return np.concatenate([v, acceleration, rates, numbers["eta"] * (np.array(drives) - u)])
+
+    times = TIME[TIME <= 2.0]
+    theirs = solve_ivp(slope, (0.0, 2.0), np.zeros(10), "LSODA", times, rtol=1e-8, atol=1e-10, max_step=0.002)
+    ours = found.first.displacement[: times.size]
+    assert np.ptp([item.force for item in found.dampers.values()], axis=1).min() > 20.0, "both dampers yield"
+    np.testing.assert_allclose(found.first.time_s[: times.size], times, atol=1e-12)
+    np.testing.assert_allclose(ours, theirs.y[:3].T, atol=2e-4 * np.abs(ours).max())
 
 
 @pytest.mark.oracle

@@ -13,6 +13,7 @@ from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
 from mrpipe.campaigns.plausibility.odd_tests import find_odd_tests
 from mrpipe.campaigns.plausibility.stuck import find_stuck_displacement, find_stuck_force
 from mrpipe.campaigns.plausibility.whole_campaign import find_exchanged_columns, find_unrelated_force
+from mrpipe.words import in_percent
 
 
 def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:
@@ -133,7 +134,10 @@ def same_records(tests: Sequence[TestArrays]) -> list[Finding]:
                 name="same-record",
                 severity="error" if leak else "warning",
                 test=overlap.second,
-                sentence=f"holds {100 * overlap.share:.3g} % of the samples of test {overlap.first} ({consequence})",
+                sentence=(
+                    f"holds {in_percent(overlap.share, digits=3)} of the samples of test {overlap.first} "
+                    f"({consequence})"
+                ),
                 remedy="name another file or other segments_s, or remove one of the two tests",
                 numbers={"share": overlap.share},
             )

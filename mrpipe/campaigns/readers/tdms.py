@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers.reader import Reader, optional, short_names
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
+from mrpipe.log_levels import errors_only
 
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
 """Properties of a channel that hold its unit: of DIAdem and LabVIEW waveforms, and of DAQmx."""
@@ -25,8 +25,8 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     """
     nptdms = optional("nptdms", "npTDMS", "tdms", path)
     # a message of this package about a file that was cut off has several lines, and names no file
-    logging.getLogger("nptdms").setLevel(logging.ERROR)
-    file = nptdms.TdmsFile.read_metadata(str(path))
+    with errors_only("nptdms"):
+        file = nptdms.TdmsFile.read_metadata(str(path))
     channels = {
         f"{group.name}/{channel.name}": channel
         for group in file.groups()
@@ -44,7 +44,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
 
     def fetch(name: str) -> Any:
         group, _, channel = name.partition("/")
-        with nptdms.TdmsFile.open(str(path)) as opened:
+        with errors_only("nptdms"), nptdms.TdmsFile.open(str(path)) as opened:
             values = np.asarray(opened[group][channel][:])
         if values.dtype.kind == "M":
             return (values - values[0]) / np.timedelta64(1, "s")

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.log_levels import errors_only
 from mrpipe.modal.search.selection import LARGEST_DAMPING
 from mrpipe.modal.spectra import ComplexArray
 
@@ -53,14 +53,8 @@ class Records:
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the progress bars and log lines of pyOMA2 out of the output of mrpipe."""
-    logger = logging.getLogger("pyoma2")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        logger.setLevel(level)
+    with errors_only("pyoma2"), contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+        yield
 
 
 class Estimator(Protocol):

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.front.laws import UNCONTROLLED, History, LawRun
 from mrpipe.reporting.style import AFTER, COLOURS, MEASURED, MODEL, figure_with_axes, label
-from mrpipe.reporting.words import number, percent
+from mrpipe.reporting.words import percent
+from mrpipe.words import number
 
 KIND_COLOURS = {"noise": "#999999", "after": AFTER, "before": MODEL, "network": COLOURS[2], "linear": COLOURS[7]}
 """Colour of each kind of model in the comparison of errors."""

@@ -11,10 +11,10 @@ import numpy as np
 from mrpipe.artifacts import Artifact, BoolArray, FloatArray
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import number, percent
+from mrpipe.reporting.words import percent
 from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.response import linear_response
-from mrpipe.words import listed
+from mrpipe.words import in_percent, listed, number
 
 UNCONTROLLED = "no damper"
 
@@ -332,7 +332,7 @@ def _millimetres(value: float) -> str:
 
 
 def _change(value: float, reference: float) -> str:
-    return f"{100.0 * (value / reference - 1.0):+.0f} %"
+    return in_percent(value / reference - 1.0, signed=True)
 
 
 def _rms(values: FloatArray) -> float:

@@ -19,9 +19,9 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
 from mrpipe.reporting.traced_words import notes_on_model, shares_in_words, shown_candidates
-from mrpipe.reporting.words import number, percent, quantity
+from mrpipe.reporting.words import percent, quantity
 from mrpipe.reporting.writer import Section
-from mrpipe.words import listed
+from mrpipe.words import listed, number
 
 _POINTS_OF_A_LOOP = 700
 _POINTS_OF_A_CURVE = 1500
@@ -362,8 +362,7 @@ def next_steps(facts: RunFacts) -> Section:
     wanted = loop.get("next_tests") or {}
     if wanted.get("tests"):
         caption = f"Tests that would decide what is open ({wanted['file']})."
-        unit = str(facts.summary("prepare").get("drive_unit") or "A")
-        section.table("tests", tables.wanted_tests(wanted["tests"], unit), caption)
+        section.table("tests", tables.wanted_tests(wanted["tests"]), caption)
     remedies = [
         f"{effect['name']}: {effect['remedy']}" for effect in statements.proper_effects(loop) if effect.get("remedy")
     ]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import number
-from mrpipe.words import listed
+from mrpipe.reporting.words import percent
+from mrpipe.words import listed, number
 
 
 def answer(facts: RunFacts) -> str:
@@ -21,7 +21,7 @@ def answer(facts: RunFacts) -> str:
     together = calibrated.get("together") or {}
     if together.get("damping_ratios"):
         ratios = listed([
-            f"{number(100.0 * ratio, 2)} % in mode {mode}"
+            f"{percent(ratio)} in mode {mode}"
             for mode, ratio in zip(together["modes"], together["damping_ratios"], strict=True)
         ])  # fmt: skip
         text += f" Calibrated together they give damping ratios of {ratios}, if every force follows its command."

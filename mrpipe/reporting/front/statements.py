@@ -15,8 +15,8 @@ from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
 from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first
-from mrpipe.reporting.words import number, percent, plain, quantity, with_interval
-from mrpipe.words import counted, duration, listed, noun
+from mrpipe.reporting.words import percent, plain, quantity, with_interval
+from mrpipe.words import counted, duration, in_percent, listed, noun, number
 
 NARROW = 0.001
 """Half width of an interval, over the value, below which its digits are not written out: it holds the noise alone."""
@@ -157,10 +157,12 @@ def _value_of(effect: Mapping[str, Any]) -> str:
     place = f" at {effect['place']}" if effect.get("place") else ""
     for name, entry in leading_first(effect):
         low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
-        level = f"{100.0 * entry.get('interval_level', 0.95):.0f} % interval"
+        level = f"{in_percent(entry.get('interval_level', 0.95))} interval"
         if 0.0 < abs(high - low) < 2.0 * NARROW * abs(entry["value"]):
             value = quantity(entry["value"], entry["unit"], 4)
             return f"{place} ({plain(name)} {value}, {level} within {percent(NARROW)})"
+        if low == high:  # the tracing gives none
+            return f"{place} ({plain(name)} {quantity(entry['value'], entry['unit'])})"
         value, _, interval = with_interval(entry["value"], low, high, entry["unit"]).partition(" (")
         return f"{place} ({plain(name)} {value}, {level} {interval.rstrip(')')})"
     return place
@@ -224,7 +226,7 @@ def weak_spots(facts: RunFacts) -> str:
     if where and verdict_class(loop) != "noise":
         part, share = max(where.items(), key=lambda item: float(item[1]))
         lay = "Before the correction" if proper_effects(loop) else "With the declared model"
-        text += f" {lay}, {percent(share)} of the squared residual lay {PARTS.get(part, plain(part))}."
+        text += f" {lay}, {percent(share)} of the squared residual lay {PARTS.get(part) or f'in {plain(part)}'}."
     recordings = [row for row in (loop.get("closed_loop") or {}).get("tests", []) if _history_error(row) is not None]
     if recordings:
         row = max(recordings, key=lambda item: _history_error(item) or 0.0)
@@ -243,13 +245,12 @@ def _history_error(row: Mapping[str, Any]) -> float | None:
 def _conditions(facts: RunFacts) -> dict[str, str]:
     """Return test -> what was done in it: `; 5.0 mm, 1.0 Hz, mean drive 0.50 A`; only for tests of one frequency."""
     prepared = facts.summary("prepare")
-    unit = prepared.get("drive_unit") or "A"
     made = {}
     for test in prepared.get("tests", []):
         if test.get("frequency_hz") and test.get("excitation", "periodic") == "periodic" and "drive_mean" in test:
             motion = f"{number(1e3 * test['amplitude_m'], 2)} mm, {number(test['frequency_hz'], 2)} Hz"
             drive = round(float(test["drive_mean"]), 2) + 0.0  # no minus sign before a zero
-            made[str(test["name"])] = f"; {motion}, mean drive {drive:.2f} {unit}"
+            made[str(test["name"])] = f"; {motion}, mean drive {drive:.2f} {prepared.get('drive_unit', '')}".rstrip()
     return made
 
 
@@ -302,13 +303,14 @@ def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
     if loop.get("noise_floor_nrmse"):
         found.append(("noise alone", loop["noise_floor_nrmse"], "noise"))
     form, effects = exchanged_form(loop), proper_effects(loop)
+    kind = "structure model" if str(loop.get("model", "")).endswith("-frame") else "damper model"
     if effects or (form and "after" in loop):
-        parts = ["damper model", form, "with the effect" if effects else ""]
+        parts = [kind, form, "with the effect" if effects else ""]
         found.append((" ".join(filter(None, parts)), loop["after"]["nrmse"], "after"))
     if "validation_nrmse" in damper:
         found.append((f"damper model {damper['form']}", damper["validation_nrmse"], "before"))
     elif "before" in loop and loop.get("model"):
-        found.append((f"damper model {loop['model']}", loop["before"]["nrmse"], "before"))
+        found.append((f"{kind} {loop['model']}", loop["before"]["nrmse"], "before"))
     if "validation_nrmse" in network:
         found.append((f"forward network {network['architecture']}", network["validation_nrmse"], "network"))
         found.append(("linear model", network.get("linear_baseline_nrmse"), "linear"))

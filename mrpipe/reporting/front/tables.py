@@ -12,7 +12,8 @@ from mrpipe.dampers.model import DamperModel
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.traced_words import determined, exchanged_form, leading_first, shares_in_words, shown_candidates
-from mrpipe.reporting.words import number, plain, quantity, readable_unit
+from mrpipe.reporting.words import plain, quantity, readable_unit
+from mrpipe.words import number
 
 _COLUMNS = {
     "name": ("test", None),
@@ -23,8 +24,8 @@ _COLUMNS = {
     "duration_s": ("duration [s]", 1.0),
     "pause_s": ("pause [s]", 1.0),
     "current": ("drive", None),
-    "current_a": ("largest drive", 1.0),
-    "drive_v": ("largest drive", 1.0),
+    "current_a": ("largest drive [A]", 1.0),
+    "drive_v": ("largest drive [V]", 1.0),
 }
 """Key of a test of next-tests.yaml -> heading, and factor of the number."""
 
@@ -100,13 +101,20 @@ def effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
                     "effect": effect["name"] + (f" at {effect['place']}" if effect.get("place") else ""),
                     "parameter": plain(name),
                     "value": number(entry["value"], 3),
-                    "from": number(low, 3) if determined(low, high) else "not determined",
-                    "to": number(high, 3) if determined(low, high) else "",
+                    "from": _end_of_interval(low, high),
+                    "to": number(high, 3) if determined(low, high) and low < high else "",
                     "unit": readable_unit(entry["unit"]),
                     "confidence": number(effect["confidence"], 2),
                 }
             )
     return pd.DataFrame(rows)
+
+
+def _end_of_interval(low: float, high: float) -> str:
+    """Return the lower end of an interval; one without width is none."""
+    if low == high:
+        return "-"
+    return number(low, 3) if determined(low, high) else "not determined"
 
 
 def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
@@ -139,13 +147,12 @@ def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> pd.DataFrame:
+def wanted_tests(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Return tests to be made, with the headings and units that people use."""
-    headings = {**_COLUMNS, **dict.fromkeys(("current_a", "drive_v"), (f"largest drive [{drive_unit}]", 1.0))}
     rows = []
     for test in tests:
         row = {}
-        for key, (heading, factor) in headings.items():
+        for key, (heading, factor) in _COLUMNS.items():
             if key in test:
                 row[heading] = number(factor * test[key]) if factor else str(test[key])
         rows.append(row | {plain(key): str(value) for key, value in test.items() if key not in {*_COLUMNS, "later"}})

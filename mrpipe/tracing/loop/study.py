@@ -38,6 +38,7 @@ from mrpipe.tracing.loop.comparison import (
 )
 from mrpipe.tracing.loop.recalibration import gain_factor, switch_threshold
 from mrpipe.tracing.rules import LoopRules
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -237,7 +238,7 @@ def _renewed(study: LoopStudy) -> Renewed:
     }
     inverse: Network | InverseTable | None = None
     if share < study.rules.force_changed:
-        summary["inverse"] = f"kept: the effect changes the force by {100.0 * share:.1f} %"
+        summary["inverse"] = f"kept: the effect changes the force by {in_percent(share, 1)}"
     elif settings.inverse == "model":
         inverse = after.table()
         summary["inverse"] = "rebuilt from the damper with its effects"

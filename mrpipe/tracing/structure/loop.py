@@ -153,7 +153,7 @@ def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit:
         )
     if len(found) < 2 or not any(item.role == "validation" for item in found):
         return None
-    return Campaign(name, "damper-bench", directory, tuple(found), drive_unit or "A")
+    return Campaign(name, "damper-bench", directory, tuple(found), drive_unit)
 
 
 def loop_signals(loops: Sequence[Recording]) -> list[LoopSignals]:

@@ -161,6 +161,24 @@ def test_what_supports_the_finding_and_where_the_model_is_bad(tmp_path: Path) ->
     assert "90 % of the squared residual lay after yield" in found["Weak spots"]
 
 
+def test_the_finding_on_a_structure_is_not_called_a_damper_and_shows_no_interval_without_width(tmp_path: Path) -> None:
+    friction = {
+        "slip_displacement": {"value": 7.712072e-5, "unit": "m", "interval": [7.712072e-5, 7.712072e-5]},
+        "force": {"value": 14.1, "unit": "N", "interval": [13.0, 15.2]},
+    }
+    found = answers(
+        tmp_path,
+        model="linear-frame",
+        base_form=None,
+        effects=[{**EFFECT, "name": "joint-friction", "place": "storey 2", "parameters": friction}],
+        residual={"structured": True, "where": {"storey_1": 0.1, "storey_2": 0.9}},
+    )
+    assert "**joint-friction** at storey 2 (slip displacement 77.1 µm)." in found["Missing"]
+    assert "90 % of the squared residual lay in storey 2." in found["Weak spots"]
+    assert "structure model with the effect 1.5 %" in found["Models"]
+    assert "damper model with the effect" not in found["Models"]
+
+
 def test_without_an_effect_nothing_is_called_added_or_corrected(tmp_path: Path) -> None:
     residual = {"structured": False, "where": {"pre_yield": 0.1, "post_yield": 0.9}}
     noise = {"verdict_class": "noise", "effects": [], "residual": residual, "before": {"nrmse": 0.005}}

@@ -34,13 +34,13 @@ def test_an_interval_over_decades_determines_nothing(low: float, high: float, ex
 
 @pytest.mark.parametrize("unit", ["A", "V"])
 def test_the_drive_of_tests_to_be_made_is_in_the_unit_of_the_campaign(unit: str) -> None:
-    frame = wanted_tests([{"name": "a", {"A": "current_a", "V": "drive_v"}[unit]: 1.5}], unit)
+    frame = wanted_tests([{"name": "a", {"A": "current_a", "V": "drive_v"}[unit]: 1.5}])
     assert frame[f"largest drive [{unit}]"].tolist() == ["1.50"]
 
 
 def test_tests_to_be_made_are_in_practical_units() -> None:
     frame = wanted_tests(
-        [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}], "A"
+        [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}]
     )
     assert list(frame.columns) == ["test", "amplitude [mm]", "drive", "rounds"]
     assert frame["amplitude [mm]"].tolist() == ["8.30", "-"]
@@ -64,6 +64,13 @@ def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: s
         heading = "share of what the base form dahl-stiffness leaves above the noise [%]"
         assert table["effect"].tolist() == ["accumulator", "stribeck"]
         assert table[heading].tolist() == ["95.0", "10.0"]
+
+
+@pytest.mark.golden
+def test_an_interval_without_width_is_not_shown() -> None:
+    slip = {"value": 7.7e-4, "unit": "m", "interval": [7.7e-4, 7.7e-4]}
+    table = effects([{"name": "joint-friction", "parameters": {"slip": slip}, "confidence": 0.9}])
+    assert table[["value", "from", "to"]].iloc[0].tolist() == ["0.000770", "-", ""]
 
 
 @pytest.mark.golden

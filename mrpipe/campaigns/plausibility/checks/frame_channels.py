@@ -12,6 +12,7 @@ from mrpipe.campaigns.plausibility.duplicates import find_overlaps
 from mrpipe.campaigns.plausibility.finding import Finding
 from mrpipe.campaigns.plausibility.library import Check
 from mrpipe.campaigns.schema import floor_of
+from mrpipe.words import in_percent
 
 DECADES = 200.0
 """Ratio of the RMS of one floor's channel to those of all other floors from which its unit is suspected."""
@@ -40,7 +41,7 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
             name="same-record",
             severity="error" if leak else "warning",
             test=overlap.second,
-            sentence=f"holds {100 * overlap.share:.3g} % of the samples of test {overlap.first}",
+            sentence=f"holds {in_percent(overlap.share, digits=3)} of the samples of test {overlap.first}",
             remedy="name another file or other segments_s, or remove one of the two tests",
             numbers={"share": overlap.share},
         )

@@ -17,6 +17,7 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.error_size import rms
 from mrpipe.tracing.bench.residuals.residual_structure import BLOCK
 from mrpipe.tracing.rules import NuisanceRules, ValidationRules
+from mrpipe.words import in_percent
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)
 """Numerical technique: lengths of a moving average that are tried first, as shares of a period."""
@@ -116,7 +117,7 @@ class SessionGain:
             "unit": "1",
             "interval": list(self.interval),
             "tests": list(self.tests),
-            "estimated_from": f"the first {100.0 * self.first_part:.0f} % of each record; errors are those of the rest",
+            "estimated_from": f"the first {in_percent(self.first_part)} of each record; errors are those of the rest",
             "spread_of_training_gains": self.spread_in_training,
             "nrmse_without": self.without,
             "nrmse_with": self.with_it,

@@ -34,7 +34,7 @@ from mrpipe.tracing.bench.validation.differences import (
 from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, unexplained_tests
 from mrpipe.tracing.rules import NoiseRules, ValidationRules
 from mrpipe.tracing.verdict import Comparable, Score, Verdict
-from mrpipe.words import listed
+from mrpipe.words import in_percent, listed
 
 
 @dataclass(frozen=True)
@@ -362,7 +362,7 @@ def _sentence(
         return f"{found}: {verb} what is missing{limit}"
     if kind == "partly explained":
         return (
-            f"{found}: {verb} part of what is missing, {100.0 * evidence.share:.0f} % of what is recoverable on the "
+            f"{found}: {verb} part of what is missing, {in_percent(evidence.share)} of what is recoverable on the "
             "validation tests"
         )
     if kind == "base form":
