@@ -109,9 +109,11 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     form = exchanged_form(summary)
     exchanged = f" with the base form {form} in place of {summary.get('model', '')}" if form else ""
     left = f"what the base form {form} leaves" if form else "the residual"
+    tied = summary.get("tied")
     verdict = (
         (f"{found}{exchanged}" if found else "")
         or (differs if summary.get("verdict_class") == "validation differs" else "")
+        or (f"{listed(tied['effects'])} explain {left} equally well" if tied else "")
         or (f"no known effect explains {left}" if unexplained else "")
         or (f"no effect is missing{exchanged}" if form else "nothing is missing")
     )

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.reporting.traced_words import tie_in_words
 from mrpipe.reporting.words import percent
 
 MAPS_CAPTION = (
@@ -72,6 +73,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         return f"{start} The rest is noise: nothing is missing."
     if not summary["effects"]:
         depends = ", ".join(item["state"] for item in summary["unexplained"]["depends_on"][:3])
+        if tied := tie_in_words(summary):
+            return f"{start} Something is missing. {tied}"
         return f"{start} Something is missing, but no known effect explains it." + (
             f" It varies with {depends}." if depends else ""
         )
@@ -92,5 +95,5 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
             parts.append(f"Not separated from {', '.join(effect['tied_with'])} by these tests ({tests}).")
     end = f"With it the error is {percent(after)}."
     if summary["unexplained"]["structured"]:
-        end += " Something is still unexplained."
+        end += f" Something is still unexplained. {tie_in_words(summary)}".rstrip()
     return f"{start} The model lacks {' '.join(parts)} {end}"

@@ -100,6 +100,18 @@ def unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
     return f"In addition, {names} {rest}{f' against {listed(rivals)}' if rivals else ''}."
 
 
+def tie_in_words(summary: Mapping[str, Any]) -> str:
+    """Return a sentence on effects of a structure that the tests do not separate, so that none is named; or nothing."""
+    tied = summary.get("tied")
+    if not tied:
+        return ""
+    remains = "what then remains" if summary["effects"] else "it"
+    tests = tied["separating_tests"]
+    which = "A test that separates them is" if len(tests) == 1 else "Tests that separate them are"
+    proposed = f" {which} {'; '.join(tests)}." if tests else ""
+    return f"{listed(tied['effects'])} explain {remains} equally well.{proposed}"
+
+
 def declared_in_words(names: Sequence[str]) -> str:
     """Return a sentence on the effects that the campaign declares; empty without any."""
     if not names:

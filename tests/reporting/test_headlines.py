@@ -97,3 +97,12 @@ def test_the_line_of_a_tracing_names_an_exchanged_base_form_and_determined_numbe
     line = next(line for line in in_brief("close-loop", found) if line.startswith("effect"))
     assert "stiffness 3.53e+03 N/m, gas length 0.5 m (not well determined)" in line
     assert headline("close-loop", tracing()).startswith("accumulator: ")
+
+
+@pytest.mark.property
+def test_tied_effects_are_in_the_line() -> None:
+    left = {"structured": True, "share_of_residual": 1.0, "depends_on": []}
+    tied = {"effects": ["impact", "yielding"], "separating_tests": []}
+    assert "impact and yielding explain the residual equally well" in headline(
+        "close-loop", tracing(effects=[], unexplained=left, tied=tied)
+    )

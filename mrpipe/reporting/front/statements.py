@@ -14,7 +14,7 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
-from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first
+from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first, tie_in_words
 from mrpipe.reporting.words import percent, plain, quantity, with_interval
 from mrpipe.words import counted, duration, in_percent, listed, noun, number
 
@@ -119,6 +119,8 @@ def missing(facts: RunFacts) -> str:
         varies = f" It varies with {listed(states)}." if states else ""
         drift = _drift_of(summary)
         lacks = f"{subject} lacks something that no effect of the library explains."
+        if tied := tie_in_words(summary):
+            lacks = f"{subject} lacks something. {tied}"
         if form:
             share = percent(summary["unexplained"]["share_of_residual"])
             lacks = f"{form} What it leaves, {share} of the squared residual, no effect of the library explains."

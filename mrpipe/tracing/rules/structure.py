@@ -113,6 +113,13 @@ class FrameRules(Section):
         gt=0.0,
         description="A further effect must recover this share of what the frame lacks.",
     )
+    lead_errors: float = Field(
+        2.0,
+        gt=0.0,
+        description="An effect is named although another one fits almost as well, if the difference of their squared "
+        "errors, on tests left out or on all training tests, exceeds its standard error by this factor, which chance "
+        "does in 2 of 100 cases. Otherwise the two are tied and none is named.",
+    )
     second_share: float = Field(
         0.5,
         gt=0.0,

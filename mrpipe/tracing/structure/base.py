@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
-from mrpipe.tracing.structure.bending import bounded_spectra, fitted_weighting, natural_frequencies
+from mrpipe.tracing.structure.bending import bounded, bounded_spectra, fitted_weighting, natural_frequencies
+from mrpipe.tracing.structure.coordinates import Band, Weighting
 from mrpipe.tracing.structure.fit import Base, Design, base_rows, design_of, stacked
+from mrpipe.tracing.structure.modes import ModalFrame, in_modes, modal_frame
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, possible_colours
-from mrpipe.tracing.structure.spectra import Band, Spectra, Weighting, motion_of, spectra_of, storey_sums
+from mrpipe.tracing.structure.spectra import Spectra, motion_of, spectra_of, storey_sums
 
 OF_RATE = 0.4
 """Numerical technique: highest frequency in use, as a share of the sampling rate, because of anti-alias filters."""
@@ -61,6 +64,8 @@ class FrameProblem:
         Linear frame, and colour of the sensors' noise [1]; the weights of the lines follow from them.
     bends
         Whether the records need the stiffness of a general linear frame; band, weights and noise then follow from it.
+    modal
+        Linear frame in the modes that the records determine; None if they determine the motion of all floors.
     """
 
     training: tuple[Spectra, ...]
@@ -73,6 +78,33 @@ class FrameProblem:
     weighting: Weighting
     colour: float
     bends: bool = False
+    modal: ModalFrame | None = None
+
+    @cached_property
+    def judged(self) -> tuple[Spectra, ...]:
+        """Spectra of the training records in the equations in which effects are judged: of storeys, or of modes."""
+        return self.in_equations(self.training)
+
+    @cached_property
+    def judged_validation(self) -> tuple[Spectra, ...]:
+        """Spectra of the validation records in the equations in which effects are judged."""
+        return self.in_equations(self.validation)
+
+    def in_modes(self, training: Sequence[Spectra]) -> FrameProblem:
+        """Return the problem with the modes that spectra of the training records determine."""
+        if not self.bends:
+            return self
+        noises = [self._noise(item) for item in self.training]
+        return replace(self, modal=modal_frame(training, noises, self.masses_kg, self.rules))
+
+    def in_equations(self, spectra: tuple[Spectra, ...]) -> tuple[Spectra, ...]:
+        """Return spectra in the equations in which effects are judged."""
+        if self.modal is None:
+            return spectra
+        return tuple(in_modes(item, self._noise(item), self.modal, self.rules) for item in spectra)
+
+    def _noise(self, item: Spectra) -> Noise:
+        return bounded(item, noise_of(item.record, self.band.high_hz, self.rules, self.colour), self.masses_kg)
 
     def spectra_of(self, record: FrameRecord) -> Spectra:
         """Return the spectra of a further record, with the same band and weights."""
@@ -315,5 +347,7 @@ def shear_stiffness_of(design: Design, masses: FloatArray) -> tuple[FloatArray, 
 
 
 def ladder(spectra: Sequence[Spectra]) -> dict[Base, Design]:
-    """Return the linear frames that are compared, from the simplest to the most general one."""
-    return {"shear-frame": design_of("shear-frame", spectra), "linear-frame": design_of("linear-frame", spectra)}
+    """Return the linear frames that are compared, the simplest one first; there is only one in equations of modes."""
+    free = design_of("linear-frame", spectra)
+    modal = spectra[0].modes is not None
+    return {"shear-frame": free if modal else design_of("shear-frame", spectra), "linear-frame": free}

@@ -113,13 +113,12 @@ class _Judge:
     def _driving(self, spectra: Spectra) -> ComplexArray:
         """Return the force that the ground exerts on each storey, or its own force if not the ground alone drives it.
 
-        Shape (n, b) [N/sqrt(Hz)].
+        It has the shape of the target of the spectra [N/sqrt(Hz)].
         """
         if spectra.record.kind not in ("sweep", "random") or spectra.record.loads or spectra.record.damper:
             return spectra.target
-        n = spectra.record.floors
-        above = storey_sums(n) @ self.masses_kg
-        return np.asarray(above[:, None] * spectra.regressors[2 * n])
+        above = storey_sums(spectra.record.floors) @ self.masses_kg
+        return spectra.in_equations(above[:, None] * spectra.lines_of(spectra.motion.ground))
 
     def further(self, first: FrameCandidate, others: Sequence[Fitted]) -> float:
         """Return the chi-square that another effect explains beyond all forms of the first one; 0 if it is noise."""

@@ -19,13 +19,12 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.structure.coordinates import Band, Weighting
 from mrpipe.tracing.structure.fit import Design, design_of
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, shape_of
 from mrpipe.tracing.structure.spectra import (
-    Band,
     Spectra,
-    Weighting,
     gains_of_floors,
     gains_of_ground,
     motion_of,

@@ -163,7 +163,7 @@ def columns_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Columns
     """Return the spectral lines of the unit forces of an effect in a record."""
     found = histories_of(fitted, spectra, about)
     lines = spectra.lines_of(found.force)
-    return Columns(found.on_storey[:, :, None] * lines[found.which][:, None, :])
+    return Columns(spectra.in_equations(found.on_storey[:, :, None] * lines[found.which][:, None, :]))
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
+from mrpipe.tracing.structure.choice import without_effects
 from mrpipe.tracing.structure.fault_search import likely_fault, with_smaller_residual
 from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.groups import groups_of
@@ -25,6 +24,7 @@ from mrpipe.tracing.structure.rounds import FrameSelection
 from mrpipe.tracing.structure.scores import frame_score
 from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
 from mrpipe.tracing.structure.spectra import Spectra
+from mrpipe.tracing.structure.ties import Tie
 from mrpipe.tracing.verdict import Score, Verdict
 from mrpipe.words import listed
 
@@ -45,7 +45,8 @@ class FaultAndEffect:
     selection
         Linear frame and effects on them.
     recorded
-        Errors of the linear frame without these effects on the validation records as they were recorded.
+        Errors of the linear frame without these effects on the validation records as they were recorded, with the
+        weights of the corrected records.
     """
 
     fault: SensorFault
@@ -53,7 +54,7 @@ class FaultAndEffect:
     selection: FrameSelection
     recorded: Score
 
-    def in_summary(self, summary: dict[str, Any], rules: FrameRules) -> dict[str, Any]:
+    def in_summary(self, summary: dict[str, Any], rules: FrameRules, tie: Tie | None) -> dict[str, Any]:
         """Return the summary of the corrected records, with the errors of the recorded ones before, and the fault.
 
         Parameters
@@ -62,17 +63,23 @@ class FaultAndEffect:
             The JSON of docs/close-loop-json.md.
         rules
             Decision thresholds; effects of a campaign with a faulty sensor are as probable as each of several effects.
+        tie
+            Effects that explain equally well what the named ones leave; None if these tests separate all effects.
         """
         most = rules.probability_of_several
         effects = [{**item, "confidence": min(item["confidence"], most)} for item in summary["effects"]]
         names = listed([f"{item['name']} ({item['place']})" for item in effects])
         most_of = "most of " if self.selection.groups.material(self.selection.residual) else ""
         leaves = f"what a fault of a sensor leaves ({self.fault.sentence()})"
-        sentence = f"{names}: explains {most_of}{leaves}; correct the channel"
+        if effects:
+            rest = f"; {tie.sentence('what then remains')}" if tie else ""
+            sentence = f"{names}: explains {most_of}{leaves}{rest}; correct the channel"
+        else:
+            sentence = f"{tie.sentence(leaves) if tie else leaves}; correct the channel"
         if differing := [item["name"] for item in summary["frame"]["differing_tests"]]:
             sentence += f"; the error of {listed(differing)} exceeds the noise nevertheless"
         tests = [{**item, "nrmse_before": self.recorded.by_test[item["name"]]} for item in summary["tests"]]
-        verdict = Verdict("partly explained", sentence).sentence_as_json()
+        verdict = Verdict("partly explained" if effects else "unknown", sentence).sentence_as_json()
         return {**summary, **verdict, "effects": effects, "before": self.recorded.as_json(), "tests": tests}
 
 
@@ -162,9 +169,35 @@ def effect_after(
     again, found = _traced(problem, fault, choose)
     if len(found.chosen) <= found.declared or not _sufficient(found, selection, rules):
         return None
-    known = selection.chosen[: selection.declared]
-    recorded = frame_score(model_of(selection.design, known, selection.about), problem.validation)
-    return FaultAndEffect(fault, again, found, recorded)
+    return FaultAndEffect(fault, again, found, _recorded_error(problem, again, found))
+
+
+def _recorded_error(problem: FrameProblem, again: FrameProblem, found: FrameSelection) -> Score:
+    """Return the errors of the linear frame on the records as they were recorded, with the weights of corrected ones.
+
+    The noise is estimated again in the corrected records. Errors with different weights are not comparable.
+
+    Parameters
+    ----------
+    problem, again
+        Spectra of the records as they were recorded, and of the corrected ones.
+    found
+        Linear frame and effects on the corrected records; the linear frame is fitted again to the recorded ones.
+    """
+    training = _with_weights_of(again.training, again, problem.training)
+    validation = _with_weights_of(again.validation, again, problem.validation)
+    known = found.chosen[: found.declared]
+    return frame_score(model_of(design_of(found.base, training), known, found.about), validation)
+
+
+def _with_weights_of(
+    corrected: Sequence[Spectra], again: FrameProblem, recorded: Sequence[Spectra]
+) -> tuple[Spectra, ...]:
+    """Return the spectra of records as they were recorded, with the weights of the corrected ones."""
+    spectra = again.spectra([item.record for item in recorded])
+    return tuple(
+        replace(item, weight=own.weight, variance=own.variance) for item, own in zip(spectra, corrected, strict=True)
+    )
 
 
 def _sufficient(found: FrameSelection, recorded: FrameSelection, rules: NamingRules) -> bool:
@@ -216,21 +249,3 @@ def _repaired(problem: FrameProblem, fault: SensorFault) -> FrameProblem:
         [repaired(item.record, fault) for item in items] for items in (problem.training, problem.validation)
     )
     return frame_problem(training, validation, problem.masses_kg, problem.rules)
-
-
-def without_effects(spectra: Sequence[Spectra], selection: FrameSelection) -> tuple[Spectra, ...]:
-    """Return spectra whose storey forces do not contain the forces of the chosen effects.
-
-    Parameters
-    ----------
-    spectra
-        Spectra of the records on which the effects were chosen.
-    selection
-        The chosen effects.
-    """
-    model = model_of(selection.design, selection.chosen, selection.about)
-    columns = [model.columns(item) for item in spectra]
-    return tuple(
-        item if own is None else replace(item, target=item.target - np.tensordot(model.amplitudes, own.lines, axes=1))
-        for item, own in zip(spectra, columns, strict=True)
-    )

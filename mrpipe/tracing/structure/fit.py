@@ -40,8 +40,11 @@ class Columns:
 def base_rows(base: Base, spectra: Spectra, storey: int) -> ComplexArray:
     """Return the regressors of a storey, shape (p, b): drift (or all floors), velocities, ground, rotations, loads.
 
-    Only the general linear frame is coupled to the rotations of the floors about the vertical.
+    Only the general linear frame is coupled to the rotations of the floors about the vertical. The equations of modes
+    contain their regressors already.
     """
+    if spectra.modes is not None:
+        return spectra.regressors
     n = spectra.record.floors
     values = spectra.regressors
     displacement, velocity, ground = values[:n], values[n : 2 * n], values[2 * n : 2 * n + 2]
@@ -143,7 +146,7 @@ def _target_of(spectra: Sequence[Spectra], storey: int) -> FloatArray:
 
 def design_of(base: Base, spectra: Sequence[Spectra]) -> Design:
     """Fit the linear model of every storey by weighted least squares."""
-    n = spectra[0].record.floors
+    n = len(spectra[0].target)
     residuals, bases, solvers, free = [], [], [], 0
     width = max(len(base_rows(base, item, 0)) for item in spectra)
     for storey in range(n):

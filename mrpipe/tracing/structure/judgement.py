@@ -12,6 +12,7 @@ from mrpipe.tracing.structure.drift import StiffnessBetweenTests
 from mrpipe.tracing.structure.on_validation import DifferingTest, in_words
 from mrpipe.tracing.structure.rounds import FrameSelection
 from mrpipe.tracing.structure.sensor_faults import SensorFault
+from mrpipe.tracing.structure.ties import Tie, tie_below_noise
 from mrpipe.tracing.verdict import NamedEffect, Verdict
 from mrpipe.words import listed
 
@@ -73,7 +74,7 @@ def why_unnamed(selection: FrameSelection, rules: NamingRules, fault: SensorFaul
     if not selection.structured:
         return "the residual is noise: nothing is missing"
     if selection.below_noise is not None and not selection.chosen:
-        return _undecided(selection.below_noise.alike)
+        return _undecided(selection)
     if len(selection.chosen) <= selection.declared:
         return "no effect of the library changes the error"
     if selection.share(selection.residual) < rules.least_share:
@@ -84,11 +85,12 @@ def why_unnamed(selection: FrameSelection, rules: NamingRules, fault: SensorFaul
     return ""
 
 
-def _undecided(alike: Sequence[str]) -> str:
+def _undecided(selection: FrameSelection) -> str:
     """Return why no effect is named for a residual that is smaller than the noise of each line."""
     small = "something smaller than the noise of each spectral line depends on the motion"
-    if len(alike) > 1:
-        return f"{small}; {listed(alike)} explain it alike"
+    if tie := tie_below_noise(selection):
+        return f"{small}; {tie.sentence('it')}"
+    alike = selection.below_noise.alike if selection.below_noise else ()
     return f"{small}; {alike[0]} explains only part of it"
 
 
@@ -114,6 +116,8 @@ class Judgement:
         Rules for naming an effect.
     validation
         Rules for the class of the verdict.
+    tie
+        Effects that explain equally well what the named ones leave; None if these tests separate all effects.
     """
 
     selection: FrameSelection
@@ -124,6 +128,7 @@ class Judgement:
     differing: Sequence[DifferingTest]
     naming: NamingRules
     validation: ValidationRules
+    tie: Tie | None = None
 
     @property
     def share(self) -> float:
@@ -134,6 +139,11 @@ class Judgement:
     def proven(self) -> bool:
         """Whether the named effects explain what is missing, on the training and on the validation tests."""
         return self.share >= self.naming.named_share and self.errors.explained(self.validation)
+
+    @property
+    def open_tie(self) -> Tie | None:
+        """Effects that explain equally well what is missing; None if the named effects explain it already."""
+        return None if self.proven else self.tie
 
     def verdict(self) -> Verdict:
         """Return class and sentence."""
@@ -146,6 +156,8 @@ class Judgement:
         if self.reason:
             return Verdict("unknown" if structured else "noise", f"{self.reason}{drift}")
         names = listed([f"{item.name} ({item.place})" for item in self.named])
+        if self.open_tie:
+            drift = f"; {self.open_tie.sentence('what then remains')}{drift}"
         if self.differing:
             form = f"explains what the training tests lack, but {in_words(self.differing)}"
             return Verdict("partly explained", f"{names}: {form}{drift}", self.share)

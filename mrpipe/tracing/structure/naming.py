@@ -10,6 +10,7 @@ from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel
 from mrpipe.tracing.structure.rounds import FrameSelection, projected
+from mrpipe.tracing.structure.ties import rivals_of
 from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
 
 STANDARD_ERRORS = 3.0
@@ -45,7 +46,7 @@ def named_effects(
             continue
         candidates = selection.rounds[place - selection.declared]
         lead = min((other.behind for other in candidates[1:]), default=1.0)
-        rivals = [other.name for other in candidates[1:] if other.behind < rules.lead]
+        rivals = [other.name for other in rivals_of(candidates, rules)]
         gain = selection.gains[place - selection.declared] if selection.gains else None
         effect = item.placed.effect
         interval = None if gain is None else LeftOutGain(gain.share, Interval(*gain.interval))
@@ -94,7 +95,7 @@ def by_effect(selection: FrameSelection, amplitudes: FloatArray) -> list[tuple[F
     """
     found, first = [], 0
     for item in selection.chosen:
-        count = _amplitudes_of(item, len(selection.design.residual))
+        count = _amplitudes_of(item, selection.design.spectra[0].record.floors)
         found.append((item, certain_amplitudes(item, amplitudes[first : first + count], selection)))
         first += count
     return found
@@ -171,6 +172,8 @@ def strong_storeys(item: Fitted, amplitudes: FloatArray, acting: float) -> list[
 def acting_on(item: Fitted, amplitudes: FloatArray, selection: FrameSelection) -> list[int]:
     """Return the storeys, from 0, in whose equations the force of an effect is large.
 
+    The equation of each mode contains the forces of all storeys.
+
     Parameters
     ----------
     item
@@ -180,8 +183,9 @@ def acting_on(item: Fitted, amplitudes: FloatArray, selection: FrameSelection) -
     selection
         Linear frame with the records.
     """
-    if item.placed.effect.acts_on == "base":
-        return list(range(len(selection.design.residual)))
+    first = selection.design.spectra[0]
+    if item.placed.effect.acts_on == "base" or first.modes is not None:
+        return list(range(first.record.floors))
     if item.placed.floor:
         return list(range(item.placed.floor))
     return strong_storeys(item, amplitudes, selection.rules.acting)

@@ -20,7 +20,8 @@ from mrpipe.tracing.structure.loop import bench_of, loop_signals
 from mrpipe.tracing.verdict import Candidate, Estimate, Interval, NamedEffect, Unexplained, Verdict
 
 OF_PART = (
-    "model", "quantity", "verdict", "verdict_class", "noise_floor_nrmse", "before", "after", "effects", "candidates"
+    "model", "quantity", "verdict", "verdict_class", "noise_floor_nrmse", "before", "after", "effects", "candidates",
+    "tied",
 )  # fmt: skip
 """Keys of a part that the joint verdict repeats under `parts`."""
 
@@ -225,5 +226,8 @@ def merged(parts: Sequence[Part]) -> dict[str, Any]:
     if not first.named:
         open_part = next((part for part in order if part.unexplained), first)
         summary["unexplained"] = open_part.summary["unexplained"]
-    summary["parts"] = {part.name: {key: part.summary[key] for key in OF_PART} for part in parts}
+    # only the frame can have effects that are tied
+    summary["tied"] = next((part.summary["tied"] for part in order if part.summary.get("tied")), None)
+    own = {part.name: {"tied": None, **part.summary} for part in parts}
+    summary["parts"] = {name: {key: values[key] for key in OF_PART} for name, values in own.items()}
     return summary

@@ -38,12 +38,20 @@ class FrameCandidate:
     behind
         Share of the gain of the best candidate on left-out records that this candidate does not reach [1]; 0 for the
         best one.
+    alike
+        Whether this candidate fits the training records almost as well as the best one, so that the left-out records
+        decide between them.
+    undecided
+        Whether neither the left-out records nor all training records show with certainty that this candidate is worse
+        than the best one.
     """
 
     outcome: Outcome
     share: float
     forms: dict[str, float]
     behind: float = 0.0
+    alike: bool = False
+    undecided: bool = False
 
     @property
     def name(self) -> str:

@@ -47,7 +47,7 @@ def _nrmse(squared_errors: float, squared_signals: float) -> float:
 
 def residual_in_time(model: FrameModel, record: Spectra) -> FloatArray:
     """Return the residual of the shear force of each storey in the band, shape (m, n) [N]."""
-    return in_time(record.target - model.predict(record), record)
+    return in_time(record.in_storeys(record.target - model.predict(record)), record)
 
 
 def states_of(record: Spectra, storey: int) -> dict[str, FloatArray]:
@@ -117,7 +117,7 @@ def flexible_score(
     errors = wholes = 0.0
     for item, force in zip(validation, extra, strict=True):
         # the trees are trained on a tapered, band-limited residual: compare the sum on the same lines
-        left = item.target - model.predict(item) - item.lines_of(force)
+        left = item.target - model.predict(item) - item.in_equations(item.lines_of(force))
         errors += float(np.sum(np.abs(left * item.weight) ** 2))
         wholes += float(np.sum(np.abs(item.target * item.weight) ** 2))
     return _nrmse(errors, wholes)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.artifacts import Progress, no_progress
+from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder
@@ -59,34 +59,38 @@ def select(
     """
     storeys, frame_rules = problem.storey_stiffness, problem.rules
     about = Surroundings(storeys, frame_rules)
-    designs = ladder(problem.training)
+    designs = ladder(problem.judged)
     chi = {str(name): item.chi_square for name, item in designs.items()}
-    forms = placed_forms(effects, len(problem.masses_kg))
+    # without a shear frame to compare with, the rotation of the base cannot be separated from a linear frame
+    able = [item for item in effects if problem.modal is None or item.acts_on != "base"]
+    forms = placed_forms(able, len(problem.masses_kg))
     simple, free = (
-        FrameSelection(
-            name, designs[name], groups_of(designs[name], frame_rules), chi, storey_stiffness=storeys, rules=frame_rules
-        )
-        for name in ("shear-frame", "linear-frame")
+        FrameSelection(item.base, item, groups_of(item, frame_rules), chi, storey_stiffness=storeys, rules=frame_rules)
+        for item in designs.values()
     )
     progress(0.3, "linear frames")
     if not simple.structured and not declared:
         found = _below_noise(free, problem, forms, rules, most, rng, draws, jobs)
         return simple if found.below_noise is None else found
-    rocking = on_rocking_base(simple, free, forms, jobs, rules.least_share)
+    # a shear frame moves in all its modes
+    rocking = None if problem.modal else on_rocking_base(simple, free, forms, jobs, rules.least_share)
     if rocking is not None and not free.structured:
-        folds = folds_of(rocking.base, problem.training, rocking.about)
+        folds = folds_of(rocking.base, problem.judged, rocking.about)
         return replace(rocking, gains=gains_of(folds, rocking.chosen, 0, rng, draws))
     if declared:
         free = _with_declared(free, declared, len(problem.masses_kg), about, jobs)
     if most == 0 or not free.structured:
         return free if declared else _below_noise(free, problem, forms, rules, most, rng, draws, jobs)
-    folds = folds_of(free.base, problem.training, about)
+    folds = folds_of(free.base, problem.judged, about)
     found = needed_only(_forward(free, forms, folds, most, jobs, progress, rules), folds)
     if rocking is not None:
-        found, folds = _better(found, folds, rocking, folds_of(rocking.base, problem.training, rocking.about))
+        found, folds = _better(found, folds, rocking, folds_of(rocking.base, problem.judged, rocking.about))
     if not found.chosen:
         return found
     found = replace(found, gains=gains_of(folds, found.chosen, found.declared, rng, draws))
+    if problem.modal:
+        # each of these equations contains the forces of all storeys, so that nothing shows where a further effect acts
+        return found
     more = with_effects_elsewhere(found, forms, folds, rules, most=most, rng=rng, draws=draws, jobs=jobs)
     return replace(more, gains=gains_of(folds, more.chosen, more.declared, rng, draws)) if more.elsewhere else found
 
@@ -101,9 +105,10 @@ def _below_noise(
     draws: int,
     jobs: int,
 ) -> FrameSelection:
-    if most == 0:
+    # modes that are left out leave a residual below the noise of each line, which no effect causes
+    if most == 0 or problem.modal:
         return free
-    folds = folds_of(free.base, problem.training, free.about)
+    folds = folds_of(free.base, problem.judged, free.about)
     return with_effect_below_noise(free, forms, folds, rules, problem.masses_kg, rng=rng, draws=draws, jobs=jobs)
 
 
@@ -209,15 +214,57 @@ def by_left_out_error(
     best = candidates[0].share
     found = [replace(item, behind=best - item.share) for item in candidates]
     alike = [item for item in found if item.behind <= lead * max(1.0 - best, 0.0) + selection.rules.second_gain]
-    if folds is None or len(alike) < 2:
+    others = found[len(alike) :]
+    if len(alike) < 2:
         return tuple(found)
-    errors = [folds.error((*selection.chosen, item.outcome.fitted)) for item in alike]
-    gain = max(folds.error(selection.chosen) - min(errors), 1e-300)
-    alike = [
-        replace(item, behind=float(np.clip((error - min(errors)) / gain, 0.0, 1.0)))
-        for item, error in zip(alike, errors, strict=True)
+    if folds is None:
+        return (*_decided(alike, [np.zeros(0)] * len(alike), selection), *others)
+    errors = [folds.errors((*selection.chosen, item.outcome.fitted)) for item in alike]
+    least = min(float(item.sum()) for item in errors)
+    gain = max(folds.error(selection.chosen) - least, 1e-300)
+    ranked = sorted(zip(alike, errors, strict=True), key=lambda pair: float(pair[1].sum()))
+    alike = [replace(item, behind=float(np.clip((error.sum() - least) / gain, 0.0, 1.0))) for item, error in ranked]
+    return (*_decided(alike, [error for _, error in ranked], selection), *others)
+
+
+def _decided(
+    alike: Sequence[FrameCandidate], left_out: Sequence[FloatArray], selection: FrameSelection
+) -> tuple[FrameCandidate, ...]:
+    """Return candidates that fit alike, best first, with the information which of them may be as good as the best.
+
+    Left-out records alone cannot separate all effects: the record with the largest drift, which shows a bumper best,
+    is never left out. An effect is therefore also separated by the errors on all training records.
+    """
+    index, limit = selection.groups.index.ravel(), selection.rules.lead_errors
+    fitted = [
+        np.asarray(np.bincount(index, weights=item.outcome.solved.residual.ravel() ** 2), dtype=np.float64)
+        for item in alike
     ]
-    return (*sorted(alike, key=lambda item: item.behind), *found[len(alike) :])
+    undecided = [
+        not certainly_positive(error - left_out[0], limit) and not certainly_positive(own - fitted[0], limit)
+        for error, own in zip(left_out, fitted, strict=True)
+    ]
+    return tuple(
+        replace(item, alike=True, undecided=place > 0 and undecided[place]) for place, item in enumerate(alike)
+    )
+
+
+def certainly_positive(differences: FloatArray, errors: float) -> bool:
+    """Return whether the mean of some numbers exceeds its standard error by a factor.
+
+    For the differences of the squared errors of two models this is the test of Vuong (Econometrica 57, 1989, p. 307),
+    which compares models that do not contain each other.
+
+    Parameters
+    ----------
+    differences
+        Independent numbers, shape (g,).
+    errors
+        The factor.
+    """
+    if len(differences) < 2:
+        return False
+    return bool(np.mean(differences) > errors * np.std(differences, ddof=1) / np.sqrt(len(differences)))
 
 
 def needed_only(selection: FrameSelection, folds: Folds | None) -> FrameSelection:

@@ -17,6 +17,7 @@ from scipy import fft, signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
 from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.structure.coordinates import Band, Modes, Weighting
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.sensor_noise import Noise, laser_share
 
@@ -32,39 +33,6 @@ ABOVE_EDGE = 1.5
 QUIET_SECOND = 0.01
 """Numerical technique: a record contains a time at rest if its quietest second has less than this share of its mean
 power; the mean of a laser signal is then taken there."""
-
-
-@dataclass(frozen=True)
-class Band:
-    """Frequencies that are compared [Hz]."""
-
-    low_hz: float
-    high_hz: float
-
-
-@dataclass(frozen=True)
-class Weighting:
-    """Linear frame by which the noise of the sensors is propagated to the equations of the storeys.
-
-    Attributes
-    ----------
-    stiffness
-        Shear of each storey per floor displacement, shape (n, n) [N/m].
-    ground
-        Shear of each storey per ground acceleration, and per its second derivative over the square of the highest
-        angular frequency in use, shape (n, 2) [kg]; zero for a frame whose modes are all in the band.
-    turning
-        Shear of each storey per rotation of each floor about the vertical, shape (n, turns) [N/rad].
-    """
-
-    stiffness: FloatArray
-    ground: FloatArray
-    turning: FloatArray
-
-    @classmethod
-    def of_displacements(cls, stiffness: FloatArray, turns: int = 0) -> Weighting:
-        """Return the weighting of a frame whose forces depend on the displacements alone, not on rotations."""
-        return cls(stiffness, np.zeros((len(stiffness), 2)), np.zeros((len(stiffness), turns)))
 
 
 @dataclass(frozen=True)
@@ -93,6 +61,9 @@ class Motion:
 class Spectra:
     """Spectral lines of a record in the band.
 
+    The equations are those of the storeys. Where a structure is judged in its modes, the equations of all modes follow
+    one another as a single equation with m times as many lines, because they share coefficients.
+
     Attributes
     ----------
     record, motion
@@ -112,6 +83,8 @@ class Spectra:
         Mean square of the noise of a line, shape (n, b).
     laser_share
         Share of the displacement that comes from a displacement sensor, shape (n, b) [1].
+    modes
+        Modes in whose equations the structure is judged; None: in those of the storeys.
     """
 
     record: FrameRecord
@@ -123,10 +96,23 @@ class Spectra:
     weight: FloatArray
     variance: FloatArray
     laser_share: FloatArray
+    modes: Modes | None = None
 
     def lines_of(self, history: FloatArray) -> ComplexArray:
         """Return the lines of a history of shape (m,) or (m, k): shape (b,) or (k, b)."""
-        return spectrum_of(history, self.taper, self.record.dt, self.frequencies_hz)
+        lines = len(self.frequencies_hz) // (len(self.modes.filters) if self.modes else 1)
+        return spectrum_of(history, self.taper, self.record.dt, self.frequencies_hz[:lines])
+
+    def in_equations(self, lines: ComplexArray) -> ComplexArray:
+        """Return the lines of shear forces of the storeys, shape (..., n, b), in the equations of these spectra."""
+        if self.modes is None:
+            return lines
+        found = self.modes.equations @ lines
+        return np.asarray(found.reshape(*found.shape[:-2], 1, -1))
+
+    def in_storeys(self, lines: ComplexArray) -> ComplexArray:
+        """Return lines of the equations of these spectra as shear forces of the storeys, shape (n, b)."""
+        return lines if self.modes is None else self.modes.forces @ lines.reshape(len(self.modes.filters), -1)
 
 
 def spectrum_of(history: FloatArray, taper: FloatArray, dt: float, frequencies: FloatArray) -> ComplexArray:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from mrpipe.artifacts import Progress, no_progress
+from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules, ValidationRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
+from mrpipe.tracing.structure.choice import choice
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.exchange import exchanged_floors
 from mrpipe.tracing.structure.fault_and_effect import (
@@ -24,6 +25,7 @@ from mrpipe.tracing.structure.fault_and_effect import (
     leaves_nothing,
     promising_fault,
 )
+from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.judgement import Errors, Judgement, why_unnamed
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
@@ -34,11 +36,17 @@ from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_sc
 from mrpipe.tracing.structure.select import select
 from mrpipe.tracing.structure.sensor_faults import SensorFault
 from mrpipe.tracing.structure.spectra import Spectra
+from mrpipe.tracing.structure.ties import Tie, tie_below_noise, without_ties
 from mrpipe.tracing.verdict import Candidate, Unexplained, Verdict
 
 QUANTITY = (
     "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
     "pooled over storeys; lines of the spectrum weighted by the accelerometers' noise"
+)
+
+QUANTITY_OF_MODES = (
+    "force of every mode in the band (mass times absolute acceleration, summed with the shape of the mode) from the "
+    "measured motion, pooled over modes; lines of the spectrum weighted by the accelerometers' noise"
 )
 
 LISTED = 6
@@ -124,22 +132,30 @@ def trace_frame(
         )
 
     found = _diagnosis(problem, rules, most, choose)
-    problem, selection, about = found.problem, found.selection, found.selection.about
-    chosen = selection.chosen[: selection.declared] if found.reason else selection.chosen
+    problem, about = found.problem, found.selection.about
+    if found.reason:
+        selection, tie = found.selection, None if found.fault else tie_below_noise(found.selection)
+    else:
+        selection, tie = without_ties(found.selection, rules)
+    unnamed = found.reason
+    if tie and not unnamed and len(selection.chosen) == selection.declared:
+        unnamed = tie.sentence()
+    chosen = selection.chosen[: selection.declared] if unnamed else selection.chosen
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
     after = model_of(selection.design, chosen, about)
     progress(0.85, "errors on validation tests")
-    between = stiffness_between_tests(after, _in_order(problem, data), problem.rules)
+    of_storeys = model_of(design_of("linear-frame", problem.training), chosen, about) if problem.modal else after
+    between = stiffness_between_tests(of_storeys, _in_order(problem, data), problem.rules)
     if found.fault:
         # a faulty sensor in one test looks like a change of the stiffness
         between = replace(between, kind="constant", change=0.0, step_before="", storey=0)
-    differing = differing_tests(after, problem, selection.groups.scale, problem.rules.differing_floors)
+    differing = differing_tests(of_storeys, problem, np.ones(len(problem.masses_kg)), problem.rules.differing_floors)
     summary = _summary(
-        problem, selection, before, after, between, declared, rules, found.reason, differing,
-        validation_rules or ValidationRules(),
+        problem, selection, before, after, between, declared, rules, unnamed, differing,
+        validation_rules or ValidationRules(), tie,
     )  # fmt: skip
     if found.both:
-        summary = found.both.in_summary(summary, problem.rules)
+        summary = found.both.in_summary(summary, problem.rules, tie if summary["tied"] else None)
     elif found.fault:
         # a linear frame fits exchanged floors as well, so that the residual may be noise
         summary |= Verdict("unknown", found.reason).sentence_as_json()
@@ -177,20 +193,38 @@ def _diagnosis(
         return choose(given, most)
 
     exchange = exchanged_floors(problem)
-    # the drifts of exchanged floors are wrong, and so would be the effects that act on them
-    selection = choose(problem, 0 if exchange else most)
-    fault = exchange or promising_fault(problem, selection, rules)
     if exchange:
+        # the drifts of exchanged floors are wrong, and so would be the effects that act on them
+        selection = choose(problem, 0)
         both = effect_after(exchange, problem, selection, rules, select_all)
-    elif fault and leaves_nothing(fault, problem):
-        return _Diagnosis(problem, selection, fault.reason(), fault)
-    else:
-        both = fault_and_effect(fault, problem, selection, rules, select_all)
-    if both:
-        return _Diagnosis(both.problem, both.selection, "", both.fault, both)
-    if exchange:
+        if both:
+            return _Diagnosis(both.problem, both.selection, "", both.fault, both)
         return _Diagnosis(problem, selection, exchange.reason(), exchange)
-    return _Diagnosis(problem, selection, why_unnamed(selection, rules, fault))
+    judged, selection = choice(problem, select_all)
+    if judged.modal is None:
+        found, fault = _with_fault(problem, selection, rules, select_all)
+        return found or _Diagnosis(problem, selection, why_unnamed(selection, rules, fault))
+    share = selection.share(selection.remaining)
+    if share < rules.named_share:
+        # a faulty sensor makes the modes wrong, so that it is sought in the equations of the storeys
+        found, _ = _with_fault(problem, select_all(problem), rules, select_all)
+        if found and (found.both or share < rules.least_share):
+            return found
+    return _Diagnosis(judged, selection, why_unnamed(selection, rules))
+
+
+def _with_fault(
+    problem: FrameProblem,
+    selection: FrameSelection,
+    rules: NamingRules,
+    choose: Callable[[FrameProblem], FrameSelection],
+) -> tuple[_Diagnosis | None, SensorFault | None]:
+    """Return the diagnosis with a fault of a sensor, if one is reported, and the fault that removes most."""
+    fault = promising_fault(problem, selection, rules)
+    if fault and leaves_nothing(fault, problem):
+        return _Diagnosis(problem, selection, fault.reason(), fault), fault
+    both = fault_and_effect(fault, problem, selection, rules, choose)
+    return (_Diagnosis(both.problem, both.selection, "", both.fault, both) if both else None), fault
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:
@@ -221,15 +255,16 @@ def _summary(
     reason: str,
     differing: Sequence[DifferingTest],
     validation: ValidationRules,
+    tie: Tie | None,
 ) -> dict[str, Any]:
-    first, last = frame_score(before, problem.validation), frame_score(after, problem.validation)
-    floor = noise_floor(problem.validation, selection.groups.scale)
+    first, last = frame_score(before, problem.judged_validation), frame_score(after, problem.judged_validation)
+    floor = noise_floor(problem.judged_validation, selection.groups.scale)
     errors = Errors(first.nrmse, last.nrmse, floor, _flexible(problem, selection, before, first.nrmse))
     named = [] if reason else named_effects(selection, after, rules, explained=errors.explained(validation))
-    judgement = Judgement(selection, named, reason, errors, between, differing, rules, validation)
+    judgement = Judgement(selection, named, reason, errors, between, differing, rules, validation, tie)
     return {
         "model": selection.base,
-        "quantity": QUANTITY,
+        "quantity": QUANTITY_OF_MODES if problem.modal else QUANTITY,
         "declared_effects": [item.name for item in declared],
         "noise_floor_nrmse": floor,
         "noise_from": "accelerometers above the highest mode",
@@ -243,6 +278,7 @@ def _summary(
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
         "effects": [item.as_json() for item in named],
+        "tied": judgement.open_tie.as_json() if judgement.open_tie else None,
         **judgement.verdict().sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
         "after": last.as_json(),
@@ -256,6 +292,7 @@ def _summary(
             "frequencies_hz": problem.frequencies_hz.tolist(),
             "storey_stiffness_n_m": problem.storey_stiffness.tolist(),
             "band_hz": [problem.band.low_hz, problem.band.high_hz],
+            "judged_modes_hz": problem.modal.frequencies_hz.tolist() if problem.modal else None,
             "between_tests": between.as_json(),
             "differing_tests": [item.as_json() for item in differing],
         },
@@ -285,7 +322,7 @@ def _flexible(problem: FrameProblem, selection: FrameSelection, before: FrameMod
     if not lacking:
         return nrmse_before
     period = 1.0 / float(problem.frequencies_hz[0])
-    return flexible_score(before, problem.training, problem.validation, lacking, period)
+    return flexible_score(before, problem.judged, problem.judged_validation, lacking, period)
 
 
 def _unexplained(problem: FrameProblem, after: FrameModel, judgement: Judgement) -> Unexplained:
@@ -305,15 +342,27 @@ def _unexplained(problem: FrameProblem, after: FrameModel, judgement: Judgement)
 
 
 def _depends_on(after: FrameModel, problem: FrameProblem, storey: int) -> tuple[tuple[str, float], ...]:
-    found = dependence(after, problem.training, storey)[:LISTED]
+    found = dependence(after, problem.judged, storey)[:LISTED]
     return tuple((f"{name} of storey {storey + 1}", value) for name, value in found if value > problem.rules.listed)
 
 
 def _by_storey(selection: FrameSelection) -> list[float]:
-    over = selection.over(selection.design.residual)
-    n = len(selection.design.residual)
-    sums = np.bincount(selection.groups.storey, weights=over, minlength=n)
+    sums = _over_by_storey(selection, selection.design.residual)
     return [float(value) for value in sums / max(float(sums.sum()), 1e-300)]
+
+
+def _over_by_storey(selection: FrameSelection, residual: FloatArray) -> FloatArray:
+    """Return what is missing in each storey: excess over the noise, or power of the force in equations of modes."""
+    spectra = selection.design.spectra
+    if spectra[0].modes is None:
+        over = selection.over(residual)
+        return np.asarray(np.bincount(selection.groups.storey, weights=over, minlength=len(residual)), dtype=np.float64)
+    widths = np.cumsum([2 * item.frequencies_hz.size for item in spectra])
+    found = np.zeros(spectra[0].record.floors)
+    for item, own in zip(spectra, np.split(residual[0], widths[:-1]), strict=True):
+        real, imaginary = np.split(own, 2)
+        found += np.sum(np.abs(item.in_storeys((real + 1j * imaginary) / item.weight)) ** 2, axis=1)
+    return found
 
 
 def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, float]:
@@ -324,8 +373,7 @@ def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, floa
 
 
 def _worst_storey(selection: FrameSelection) -> int:
-    over = selection.over(selection.remaining)
-    return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
+    return int(np.argmax(_over_by_storey(selection, selection.remaining)))
 
 
 def ranking(selection: FrameSelection, problem: FrameProblem) -> list[Candidate]:
@@ -341,7 +389,7 @@ def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProbl
     return Candidate(
         item.name,
         fitted.placed.form.name,
-        frame_score(model, problem.validation).nrmse,
+        frame_score(model, problem.judged_validation).nrmse,
         0.5 * (design.chi_square - item.outcome.solved.chi_square) * design.size,
         item.share,
         item.forms,

@@ -212,7 +212,7 @@ def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> F
 
 def _histories(frame: FrameTracing) -> dict[str, History]:
     found = {}
-    for record in frame.problem.validation:
+    for record in frame.problem.judged_validation:
         for when, model in (("before", frame.before), ("after", frame.after)):
             found[f"validation/{record.record.name}/residual_{when}"] = History(
                 residual_in_time(model, record), "N", ("sample", "storey")
@@ -223,7 +223,7 @@ def _histories(frame: FrameTracing) -> dict[str, History]:
 
 
 def _maps(frame: FrameTracing) -> list[tuple[int, FloatArray, FloatArray, FloatArray]]:
-    residual = np.concatenate([residual_in_time(frame.before, item) for item in frame.problem.training])
+    residual = np.concatenate([residual_in_time(frame.before, item) for item in frame.problem.judged])
     drift = np.concatenate([item.motion.drift for item in frame.problem.training], axis=1)
     rate = np.concatenate([item.motion.drift_rate for item in frame.problem.training], axis=1)
     return [(k + 1, drift[k], rate[k], residual[:, k]) for k in range(residual.shape[1])]
@@ -233,7 +233,7 @@ def _shown(frame: FrameTracing) -> list[tuple[str, int, FloatArray, FloatArray, 
     where = frame.summary["residual"]["where"]
     storey = max(range(len(where)), key=lambda k: list(where.values())[k])
     found = []
-    for record in frame.problem.validation[:3]:
+    for record in frame.problem.judged_validation[:3]:
         time = np.arange(len(record.taper), dtype=np.float64) * record.record.dt
         shear = record.motion.acceleration @ (np.triu(np.ones((len(where),) * 2)) * frame.problem.masses_kg).T
         before, after = (residual_in_time(model, record)[:, storey] for model in (frame.before, frame.after))

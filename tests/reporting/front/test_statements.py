@@ -263,3 +263,10 @@ def test_a_base_form_that_explains_nearly_all_is_not_called_a_lack(tmp_path: Pat
     assert "lacks something" not in found["Missing"]
     assert "What it leaves, 0.025 % of the squared residual, no effect" in found["Missing"]
     assert "damper model rounded-yield 1.5 %" in found["Models"]
+
+
+def test_tied_effects_are_named_as_such_with_the_test_that_separates_them(tmp_path: Path) -> None:
+    tied = {"effects": ["impact", "yielding"], "separating_tests": ["a free decay"]}
+    text = answers(tmp_path, effects=[], unexplained=UNKNOWN, tied=tied)["Missing"]
+    assert "lacks something. impact and yielding explain it equally well." in text
+    assert "A test that separates them is a free decay." in text and "no effect of the library" not in text

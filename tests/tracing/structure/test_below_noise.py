@@ -83,5 +83,6 @@ def test_effects_that_explain_it_alike_are_not_named(monkeypatch: pytest.MonkeyP
     data = frame_data(noisy(frame_campaign("joint-friction")))
     summary = trace_frame(data, LIBRARY, [], NamingRules(), draws=40, rng=np.random.default_rng(1)).summary
     assert summary["effects"] == [] and summary["verdict_class"] == "unknown"
-    assert "impact and yielding explain it alike" in summary["verdict"]
+    assert "impact and yielding explain it equally well" in summary["verdict"]
     assert summary["unexplained"]["structured"]
+    assert summary["tied"]["effects"] == ["impact", "yielding"]

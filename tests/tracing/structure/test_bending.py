@@ -10,10 +10,11 @@ from scipy import linalg
 
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.bending import bounded, natural_frequencies
+from mrpipe.tracing.structure.coordinates import Weighting
 from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.sensor_noise import Noise
-from mrpipe.tracing.structure.spectra import Weighting, storey_sums
+from mrpipe.tracing.structure.spectra import storey_sums
 from tests.tracing.structure.towers import MASSES, RATE, stiffness_of, tower_records
 
 

@@ -10,12 +10,16 @@ import pytest
 
 from mrpipe.effects.structural.library import all_structural_effects
 from mrpipe.tracing.options import NamingRules, TracingOptions
-from mrpipe.tracing.structure.fault_and_effect import _sufficient, without_effects
+from mrpipe.tracing.structure.base import frame_problem
+from mrpipe.tracing.structure.choice import without_effects
+from mrpipe.tracing.structure.fault_and_effect import _recorded_error, _sufficient, _with_weights_of
 from mrpipe.tracing.structure.fit import design_of
 from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.judgement import why_unnamed
+from mrpipe.tracing.structure.model import model_of
 from mrpipe.tracing.structure.records import frame_data
 from mrpipe.tracing.structure.rounds import FrameSelection
+from mrpipe.tracing.structure.scores import frame_score
 from mrpipe.tracing.structure.sensor_faults import SensorFault
 from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
 from tests.tracing.structure.test_sensor_faults import faulty_campaign
@@ -49,6 +53,22 @@ def test_the_fault_and_the_effect_are_both_reported(fault: str, gain: float, tes
     assert summary["verdict_class"] == "partly explained" and "floor_acceleration_" in summary["verdict"]
     assert summary["after"]["nrmse"] < 0.5 * summary["before"]["nrmse"]
     assert all(item["nrmse_after"] < item["nrmse_before"] for item in summary["tests"])
+
+
+def test_both_errors_have_the_weights_of_the_corrected_records() -> None:
+    """A sensor that reads too much also seems to have more noise, which would make the error before look small."""
+    found = _traced("gain", "cubic-stiffness")
+    data = frame_data(faulty_campaign("gain", "cubic-stiffness"))
+    recorded = frame_problem(data.with_role("training"), data.with_role("validation"), data.masses_kg)
+    (own,) = _with_weights_of(found.problem.validation, found.problem, recorded.validation)
+    (corrected,) = found.problem.validation
+    np.testing.assert_array_equal(own.weight, corrected.weight)
+    assert np.max(np.abs(own.target - corrected.target)) > 0.0
+    assert found.summary["before"]["nrmse"] == _recorded_error(recorded, found.problem, found.selection).nrmse
+    # records that need no correction have the same error with their own weights
+    same = _recorded_error(found.problem, found.problem, found.selection)
+    known = model_of(found.selection.design, (), found.selection.about)
+    assert same.nrmse == pytest.approx(frame_score(known, found.problem.validation).nrmse, rel=1e-9)
 
 
 def test_a_fault_alone_is_not_reported_with_an_effect() -> None:

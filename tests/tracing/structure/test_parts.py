@@ -36,6 +36,14 @@ def test_the_part_that_names_an_effect_comes_first() -> None:
     assert set(found["parts"]["frame"]) == set(OF_PART)
 
 
+def test_tied_effects_of_a_part_that_is_not_the_first_are_kept() -> None:
+    tied = {"effects": ["impact", "yielding"], "separating_tests": []}
+    frame = Part("frame", {**_part("frame", structured=True).summary, "tied": tied})
+    found = merged([frame, _part("damper", "remanence")])
+    assert found["part"] == "damper" and found["tied"] == tied == found["parts"]["frame"]["tied"]
+    assert merged([_part("frame")])["tied"] is None
+
+
 def test_effects_of_all_parts_are_listed() -> None:
     found = merged([_part("frame", "impact"), _part("command", "controller-delay")])
     assert [item["name"] for item in found["effects"]] == ["impact", "controller-delay"]

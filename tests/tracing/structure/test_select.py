@@ -18,7 +18,7 @@ from mrpipe.tracing.structure.flexible import gain_beyond
 from mrpipe.tracing.structure.left_out import folds_of
 from mrpipe.tracing.structure.records import frame_data
 from mrpipe.tracing.structure.rounds import FrameSelection, admissible, placed_forms, projected, taken
-from mrpipe.tracing.structure.select import beyond_forms, by_left_out_error, needed_only, select
+from mrpipe.tracing.structure.select import beyond_forms, by_left_out_error, certainly_positive, needed_only, select
 from tests.tracing.structure.rig import frame_campaign
 
 pytestmark = pytest.mark.planted
@@ -116,6 +116,30 @@ def test_left_out_records_decide_between_candidates_that_fit_alike() -> None:
     found = by_left_out_error((friction, by_name["cubic-stiffness"]), before, folds, 0.3)
     assert [item.name for item in found] == ["cubic-stiffness", "joint-friction"]
     assert found[0].behind == 0.0 and found[1].behind > 0.3
+    assert all(item.alike for item in found) and not any(item.undecided for item in found)
+
+
+def test_candidates_are_undecided_unless_one_record_set_separates_them() -> None:
+    alone = selected("cubic-stiffness", "joint-friction", "cubic-stiffness")
+    folds = folds_of(alone.base, problem("cubic-stiffness").training, alone.about)
+    before = replace(alone, chosen=())
+    by_name = {item.name: item for item in alone.rounds[0]}
+    cubic, friction = by_name["cubic-stiffness"], replace(by_name["joint-friction"], share=0.9)
+    # the same force under another name
+    same = replace(friction, outcome=cubic.outcome)
+    for records in (folds, None):
+        found = by_left_out_error((replace(cubic, share=0.91), same), before, records, 0.3)
+        assert [item.undecided for item in found] == [False, True]
+        found = by_left_out_error((replace(cubic, share=0.91), friction), before, records, 0.3)
+        assert [item.undecided for item in found] == [False, False]
+
+
+def test_numbers_are_certainly_positive_beyond_a_multiple_of_their_standard_error() -> None:
+    numbers = np.random.default_rng(3).standard_normal(400)
+    numbers -= np.mean(numbers)
+    numbers /= np.std(numbers, ddof=1)
+    assert certainly_positive(numbers + 0.11, 2.0) and not certainly_positive(numbers + 0.09, 2.0)
+    assert not certainly_positive(np.ones(1), 2.0) and not certainly_positive(np.zeros(0), 2.0)
 
 
 def test_a_clear_lead_on_the_training_records_decides_alone() -> None:

@@ -107,3 +107,39 @@ def eccentric_building() -> Campaign:
         tests.append(Recording(name, role, RATE, np.arange(size) / RATE, channels, ((0, size),), "random", {}))
     declared = {"frame": {"sensor_positions_m": POSITIONS}}
     return Campaign("eccentric", "shear-frame", Path(), tuple(tests), floor_masses_kg=tuple(masses), declared=declared)
+
+
+BUMPED_FLOOR, GAP_M, BUMPER_N_M = 4, 0.0025, 4.0e5
+"""Floor of the wall that hits a bumper on one side, its clearance [m], and the stiffness of the bumper [N/m]."""
+
+
+def bumped_wall(noise: float = 0.002) -> list[FrameRecord]:
+    """Return records of a wall whose floor hits a bumper: two for training, one for validation.
+
+    The linear wall is integrated exactly over steps in which ground and bumper act constantly.
+    """
+    rng, fine, n = np.random.default_rng(31), 5, FLOORS
+    stiffness = stiffness_of("wall")
+    squared, shapes = linalg.eigh(stiffness, np.diag(MASSES))
+    damping = np.diag(MASSES) @ shapes @ np.diag(0.03 * np.sqrt(squared)) @ shapes.T @ np.diag(MASSES)
+    inverse = np.diag(1.0 / MASSES)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+    inputs = np.zeros((2 * n, 2))
+    inputs[n:, 0], inputs[n + BUMPED_FLOOR - 1, 1] = -1.0, -1.0 / MASSES[BUMPED_FLOOR - 1]
+    whole = linalg.expm(np.block([[state, inputs], [np.zeros((2, 2 * n + 2))]]) / (RATE * fine))
+    found = []
+    for name, role, level in (("a", "training", 0.5), ("b", "training", 0.9), ("c", "validation", 0.7)):
+        size = int(30.0 * RATE)
+        band = signal.butter(4, [1.0, 35.0], "bandpass", fs=RATE * fine, output="sos")
+        ground = level * signal.sosfilt(band, rng.standard_normal(size * fine)) * signal.windows.tukey(size * fine, 0.4)
+        moved, z = np.zeros((size, n)), np.zeros(2 * n)
+        for k, acceleration in enumerate(ground):
+            force = BUMPER_N_M * max(z[BUMPED_FLOOR - 1] - GAP_M, 0.0)
+            if k % fine == 0:
+                moved[k // fine] = state[n:] @ z + inputs[n:, 1] * force
+            z = whole[: 2 * n, : 2 * n] @ z + whole[: 2 * n, 2 * n :] @ (acceleration, force)
+        seen = ground[::fine] + noise * rng.standard_normal(size)
+        found.append(
+            FrameRecord(name, role, "random", RATE, seen, moved + noise * rng.standard_normal((size, n)), {}, {}, {})
+        )
+    return found
