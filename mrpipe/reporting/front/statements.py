@@ -118,9 +118,8 @@ def missing(facts: RunFacts) -> str:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         varies = f" It varies with {listed(states)}." if states else ""
         drift = _drift_of(summary)
-        lacks = f"{subject} lacks something that no effect of the library explains."
-        if tied := tie_in_words(summary):
-            lacks = f"{subject} lacks something. {tied}"
+        tied = tie_in_words(summary)
+        lacks = f"{subject} lacks something" + (f". {tied}" if tied else " that no effect of the library explains.")
         if form:
             share = percent(summary["unexplained"]["share_of_residual"])
             lacks = f"{form} What it leaves, {share} of the squared residual, no effect of the library explains."
