@@ -13,6 +13,7 @@ from mrpipe.modal.ambient.free_decays import find_decay_modes
 from mrpipe.modal.ambient.harmonics import harmonic_findings, without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.clocks.delays import SensorClock, added
+from mrpipe.modal.clocks.sensor_errors import SensorErrors
 from mrpipe.modal.fit.own_residues import with_own_residues
 from mrpipe.modal.loggers import aligned, far_clocks, limit_findings
 from mrpipe.modal.options import IdentificationOptions
@@ -81,7 +82,8 @@ def find_modes(
     chosen = _completed(chosen, layout, options, progress)
     sharp = sharpened(chosen.search, chosen.tests)
     # a fit of the forced tests alone does not contain the modes that decay tests show better
-    whole = with_decays(with_own_residues(sharp.fit), tests.decays)
+    cleaning = SensorErrors(chosen.tests, clocks).removed if clocks else None
+    whole = with_decays(with_own_residues(sharp.fit, cleaning), tests.decays)
     chosen = ChosenTests(replace(sharp, fit=whole), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.modal.clocks.delays import SensorClock, added, corrected, estimate_clocks
 from mrpipe.modal.fit.multimode import fit_modes
@@ -93,9 +95,10 @@ def _largest_coupling(fit: MultiModeFit, layout: Layout) -> float:
     return float(np.abs(np.triu(coupling, 1)).max())
 
 
-def _imaginary_part(fit: MultiModeFit) -> float:
-    """Return the squared imaginary parts of the residues over their variance, summed."""
-    return float(np.sum(np.square(fit.residues.imag / np.maximum(fit.residue_errors, 1e-300))))
+def _imaginary_part(fits: Sequence[MultiModeFit], errors: Sequence[FloatArray]) -> float:
+    """Return the squared imaginary parts of the residues over the squares of `errors`, summed over the fits."""
+    pairs = zip(fits, errors, strict=True)
+    return float(sum(np.sum(np.square(fit.residues.imag / np.maximum(error, 1e-300))) for fit, error in pairs))
 
 
 def with_clocks(
@@ -137,7 +140,10 @@ def _estimated(
 ) -> tuple[list[SensorClock] | None, tuple[FrameTest, ...]]:
     """Return the delays of the sensors and the corrected tests; None where no further delay makes the shapes real."""
     fits = _fits(fit)
-    before = sum(_imaginary_part(item) for item in fits)
+    # correct clocks also reduce the errors of the residues, so that their own errors would let a shape that another
+    # cause makes complex, such as a mode that was not found, seem more complex than before
+    errors = [item.residue_errors for item in fits]
+    before = _imaginary_part(fits, errors)
     start = len(clocks)
     total = clocks
     moved = tuple(corrected(test, total) for test in tests)
@@ -158,7 +164,7 @@ def _estimated(
             for item, own in zip(fits, groups_of_spectra, strict=True)
         ]
     cost = 2.0 * max(len(total) - start, 1) * np.log(max(sum(item.residues.size for item in fits), 2))
-    if total is clocks or sum(_imaginary_part(item) for item in fits) + cost > before:
+    if total is clocks or _imaginary_part(fits, errors) + cost > before:
         return None, tests
     return total, moved
 

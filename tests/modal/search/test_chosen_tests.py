@@ -14,7 +14,7 @@ from mrpipe.modal.clocks.delays import SensorClock, corrected
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.search.chosen_tests import choose_tests, training_first, with_clocks, without_complex
+from mrpipe.modal.search.chosen_tests import _estimated, choose_tests, training_first, with_clocks, without_complex
 from mrpipe.modal.search.selection import Layout
 from mrpipe.structures import complex_modes
 from tests.modal.rig import Rig, random_frame, sweep_test
@@ -99,7 +99,24 @@ def test_steps_of_clocks_wait_until_all_modes_are_found(monkeypatch: pytest.Monk
         return [SensorClock("a", tests[0].sensors[0], 1e-6, 1e-6)] if len(allowed) == 1 else []
 
     monkeypatch.setattr("mrpipe.modal.search.chosen_tests.estimate_clocks", seen)
-    monkeypatch.setattr("mrpipe.modal.search.chosen_tests._imaginary_part", lambda fit: 1e6 - 1e3 * len(allowed))
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests._imaginary_part", lambda *_: 1e6 - 1e3 * len(allowed))
     with_clocks(incomplete, _tests(*forced), LAYOUT, OPTIONS)
     assert allowed[0] == (2, False)
     assert (3, True) in allowed
+
+
+def test_clocks_are_corrected_where_a_mode_that_was_not_found_makes_shapes_complex(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The correction halves the imaginary parts, and reduces the errors of the residues to a tenth."""
+    forced = (_sweep("a", "training"),)
+    chosen, _ = choose_tests(forced, _tests(*forced), LAYOUT, OPTIONS)
+    fit = chosen.search.fit
+    complex_fit = replace(fit, residues=fit.residues.real + 20j * fit.residue_errors)
+    better = replace(fit, residues=fit.residues.real + 10j * fit.residue_errors, residue_errors=fit.residue_errors / 10)
+    late = SensorClock("a", forced[0].sensors[0], 1e-3, 1e-6)
+    found = iter([[late], []])
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests.estimate_clocks", lambda *_: next(found))
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests.fit_modes", lambda *_, **__: better)
+    clocks, _ = _estimated(complex_fit, forced, [], False)
+    assert clocks == [late]
