@@ -68,6 +68,10 @@ def modal_frame(
 ) -> ModalFrame | None:
     """Return the linear frame in the modes that records determine; None if they determine the motion of all floors.
 
+    None is also returned if a force on a floor is measured, such as that of a damper or a shaker. The modes that are
+    left out follow this force without delay, and the equations of the others would have to contain this motion. Under
+    motion of the ground it is proportional to the acceleration of the ground, which each equation contains.
+
     Parameters
     ----------
     spectra
@@ -81,7 +85,7 @@ def modal_frame(
     """
     shapes = moving_directions(spectra, noises, masses)
     count, turns = shapes.shape[1], spectra[0].record.turns
-    if count in (0, len(masses)):
+    if count in (0, len(masses)) or any(item.record.loads or item.record.damper for item in spectra):
         return None
     frame = ModalFrame(_modes_of(shapes, masses), np.zeros(count), np.zeros((count, 2)), np.zeros((count, turns)))
     for _ in range(ROUNDS):
@@ -137,9 +141,6 @@ def in_modes(spectra: Spectra, noise: Noise, frame: ModalFrame, rules: FrameRule
     last = len(values) - 2 * turns
     columns = [_symmetric(modes.filters @ values[:n]), _symmetric(modes.filters @ values[n : 2 * n])]
     columns += [_separate(item, count) for item in (*values[2 * n : 2 * n + 2], *values[last:])]
-    floors = sorted({*spectra.record.loads, *([1] if "force" in spectra.record.damper else [])})
-    for floor, load in zip(floors, values[2 * n + 2 : last], strict=True):
-        columns.append((modes.equations[:, :floor].sum(axis=1)[:, None] * load)[None])
     variance = _variance(spectra, noise, frame)
     variance += rules.model_floor**2 * np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
     return replace(
@@ -167,8 +168,6 @@ def _variance(spectra: Spectra, noise: Noise, frame: ModalFrame) -> FloatArray:
     variance += frame.turning**2 @ (noise.of_turning(frequencies) / omega2**2)
     of_lasers = np.array([noise.displacement.get(k + 1, 0.0) for k in range(filters.shape[1])])[:, None] * lasers**2
     variance += (stiffness * filters) ** 2 @ of_lasers
-    for floor, density in noise.loads.items():
-        variance += (frame.modes.equations[:, :floor].sum(axis=1)[:, None]) ** 2 * density
     return np.asarray(variance)
 
 
