@@ -28,6 +28,6 @@ def test_a_constant_force_has_no_fit_and_the_reason_is_named() -> None:
 def test_noise_about_a_constant_drive_is_no_change() -> None:
     noisy = pool([_score([1.0 + 1e-3 * (-1) ** index for index in range(8)], 0.05)])
     assert noisy.fit_percent < -1000.0
-    assert "changes by 0.1 %" in str(doubt_about_fit(noisy.nrmse, noisy.fit_percent, "drive"))
+    assert "changes by 0.10 %" in str(doubt_about_fit(noisy.nrmse, noisy.fit_percent, "drive"))
     sound = pool([_score([1.0, -1.0, 2.0, -2.0], 0.1)])
     assert sound.fit_percent > 90.0 and doubt_about_fit(sound.nrmse, sound.fit_percent, "drive") is None
