@@ -39,6 +39,14 @@ def shortest(path: str | Path) -> str:
     return str(Path(path).relative_to(here)) if within else str(path)
 
 
+def separating_tests(tests: Sequence[str]) -> str:
+    """Return `a test that separates them is ...`, in the number of the proposed tests; empty if there are none."""
+    if not tests:
+        return ""
+    which = "a test that separates them is" if len(tests) == 1 else "tests that separate them are"
+    return f"{which} {'; '.join(tests)}"
+
+
 def noun(count: int, word: str) -> str:
     """Return a regular noun in the number that a count requires: `test` for 1, else `tests`."""
     return word if count == 1 else f"{word}s"

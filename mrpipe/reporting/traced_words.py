@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.words import listed
+from mrpipe.words import listed, separating_tests
 
 WELL_DETERMINED = 1.0
 """Width of an interval, over the magnitude of the value, up to which a parameter is called well determined."""
@@ -106,10 +106,9 @@ def tie_in_words(summary: Mapping[str, Any]) -> str:
     if not tied:
         return ""
     remains = "what then remains" if summary["effects"] else "it"
-    tests = tied["separating_tests"]
-    which = "A test that separates them is" if len(tests) == 1 else "Tests that separate them are"
-    proposed = f" {which} {'; '.join(tests)}." if tests else ""
-    return f"{listed(tied['effects'])} explain {remains} equally well.{proposed}"
+    proposed = separating_tests(tied["separating_tests"])
+    sentence = f" {proposed[0].upper()}{proposed[1:]}." if proposed else ""
+    return f"{listed(tied['effects'])} explain {remains} equally well.{sentence}"
 
 
 def declared_in_words(names: Sequence[str]) -> str:

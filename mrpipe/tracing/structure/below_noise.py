@@ -115,7 +115,7 @@ class _Judge:
 
         It has the shape of the target of the spectra [N/sqrt(Hz)].
         """
-        if spectra.record.kind not in ("sweep", "random") or spectra.record.loads or spectra.record.damper:
+        if spectra.record.kind not in ("sweep", "random") or spectra.record.carries_device:
             return spectra.target
         above = storey_sums(spectra.record.floors) @ self.masses_kg
         return spectra.in_equations(above[:, None] * spectra.lines_of(spectra.motion.ground))

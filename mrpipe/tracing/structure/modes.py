@@ -85,7 +85,7 @@ def modal_frame(
     """
     shapes = moving_directions(spectra, noises, masses)
     count, turns = shapes.shape[1], spectra[0].record.turns
-    if count in (0, len(masses)) or any(item.record.loads or item.record.damper for item in spectra):
+    if count in (0, len(masses)) or any(item.record.carries_device for item in spectra):
         return None
     frame = ModalFrame(_modes_of(shapes, masses), np.zeros(count), np.zeros((count, 2)), np.zeros((count, turns)))
     for _ in range(ROUNDS):

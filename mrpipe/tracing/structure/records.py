@@ -93,6 +93,11 @@ class FrameRecord:
         return {**self.loads, **({1: self.damper["force"]} if "force" in self.damper else {})}
 
     @property
+    def carries_device(self) -> bool:
+        """Whether a shaker or a damper acts on a floor, so that the ground does not drive the structure alone."""
+        return bool(self.loads or self.damper)
+
+    @property
     def relative(self) -> FloatArray:
         """Acceleration relative to the ground, shape (m, n) [m/s2]."""
         return np.asarray(self.acceleration - self.ground[:, None])

@@ -15,7 +15,7 @@ from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.fit import solve
 from mrpipe.tracing.structure.rounds import FrameCandidate, FrameSelection, projected
-from mrpipe.words import listed
+from mrpipe.words import listed, separating_tests
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,7 @@ class Tie:
 
     def sentence(self, what: str = "what is missing") -> str:
         """Return that the effects explain something equally well, and the tests that separate them."""
-        which = "a test that separates them is" if len(self.tests) == 1 else "tests that separate them are"
-        proposed = f"; {which} {'; '.join(self.tests)}" if self.tests else ""
+        proposed = f"; {separating_tests(self.tests)}" if self.tests else ""
         return f"{listed(self.names)} explain {what} equally well, and these tests do not separate them{proposed}"
 
 
