@@ -6,8 +6,10 @@ import time
 from pathlib import Path
 
 import pytest
+import yaml
 from pydantic import BaseModel, ConfigDict
 
+from mrpipe.artifacts import yaml_source
 from mrpipe.artifacts.yaml_source import nearest, parse, read_yaml
 from mrpipe.errors import UserError
 
@@ -132,3 +134,34 @@ def test_of_equally_close_words_the_one_with_the_same_first_letter_is_named() ->
     assert nearest("xF", ["t", "x", "i", "F"]) == "did you mean x?"
     assert nearest("qq", ["t", "x"]) == "known: t, x"
     assert nearest("t", ["b/t", "a/t"]) == "did you mean a/t?"
+
+
+@pytest.mark.property
+@pytest.mark.skipif(not yaml.__with_libyaml__, reason="PyYAML was built without libyaml, so there is one parser")
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: &shared {x: 1, y: 0123}\nb:\n  <<: *shared\n  y: 10:30\n",
+        "text: >-\n  two\n  lines\n\nvalues: [1, 2.5, -3.0e+2, .inf, 'quoted', ~, yes]\n",
+        "tests:\n- {name: é, role: training}   # a remark\n- name: b\n  role: validation\n",
+        "date: 2026-30-01\n? long key\n: value\n",
+    ],
+)
+def test_both_parsers_give_the_same_content_and_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(text, encoding="utf-8")
+    used: list[type] = []
+    given = yaml_source._parse_with
+
+    def counted(loader: type, text: str, source: str | Path) -> tuple[object, object]:
+        used.append(loader)
+        return given(loader, text, source)
+
+    monkeypatch.setattr(yaml_source, "_parse_with", counted)
+    fast = read_yaml(file)
+    assert used == [yaml_source._FastLoader]
+    assert issubclass(used[0], yaml.CSafeLoader)
+    monkeypatch.setattr(yaml_source, "_FastLoader", yaml_source._Loader)
+    assert read_yaml(file) == fast
