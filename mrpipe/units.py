@@ -165,9 +165,9 @@ def bracketed_units(text: str) -> list[BracketedUnit]:
     return found
 
 
-def same_dimension(unit: str, quantity: str) -> bool:
-    """Return whether `unit` measures `quantity`."""
-    return bool(_parse(unit, "").dimensionality == _registry().parse_units(SI_UNITS[quantity]).dimensionality)
+def same_dimension(unit: str, quantity: str, *, where: str = "") -> bool:
+    """Return whether `unit` measures `quantity`; `where` is file and key for the message on an unknown unit."""
+    return bool(_parse(unit, where).dimensionality == _registry().parse_units(SI_UNITS[quantity]).dimensionality)
 
 
 def same_unit_dimension(unit: str, other: str, *, where: str = "") -> bool:

@@ -298,7 +298,8 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
     where = f"{reader.source.path}: {reader.source.where(_place_of(reader, name, place))}"
     quantity = quantity_of(name, reader.entry.rig)
     if quantity == "drive":
-        kind = next((item for item in ("current", "voltage") if units.same_dimension(channel.unit, item)), "")
+        kinds = ("current", "voltage")
+        kind = next((item for item in kinds if units.same_dimension(channel.unit, item, where=where)), "")
         if not kind:
             raise UserError(where, f"unit {channel.unit!r}", "is not a unit of current or voltage", _DRIVE_REMEDY)
         known = reader.drive_units.setdefault("drive", units.SI_UNITS[kind])
@@ -312,7 +313,7 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
         quantity = kind
     if channel.mass_kg is not None:
         quantity = "acceleration"
-    elif name.startswith("input_force") and units.same_dimension(channel.unit, "acceleration"):
+    elif name.startswith("input_force") and units.same_dimension(channel.unit, "acceleration", where=where):
         remedy = "give mass_kg of the moving mass where its acceleration was recorded, or a unit of force"
         raise UserError(where, f"unit {channel.unit!r}", "is not a unit of force", remedy)
     units.conversion(channel.unit, where=where, quantity=quantity)

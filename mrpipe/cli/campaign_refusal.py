@@ -86,7 +86,8 @@ def refuse_unknown_effects(pipeline: Pipeline, names: Collection[str]) -> None:
         If that is so; the message names the line of the campaign file and the nearest known effect.
     """
     from mrpipe.campaigns.header import read_header
-    from mrpipe.cli.checking import measured_campaigns, own_effects, require_known_effects, with_required
+    from mrpipe.cli.checking import measured_campaigns, require_known_effects, with_required
+    from mrpipe.cli.own_effects import own_effects
 
     if "close-loop" not in with_required(pipeline.stages, names):
         return

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from mrpipe.campaigns.header import CampaignHeader
     from mrpipe.campaigns.plausibility import Finding
     from mrpipe.config.loader import LoadedConfig
-    from mrpipe.config.model import RunSettings
     from mrpipe.pipeline.stage import Stage
 
 RIGS = {"bench": "damper-bench", "frame": "shear-frame", "closed_loop": "shear-frame"}
@@ -66,48 +65,18 @@ def check_stages(loaded: LoadedConfig) -> None:
     UserError
         If a stage is unknown or its settings do not fit together.
     """
+    from mrpipe.cli.own_effects import refuse_other_rig, without_own_effects
     from mrpipe.cli.session import require_stages
     from mrpipe.pipeline.settings_view import SettingsView
     from mrpipe.stages.registry import stage_named
 
     require_stages(loaded)
-    config = _without_own_effects(loaded)
+    refuse_other_rig(loaded)
+    config = without_own_effects(loaded)
     for name in loaded.config.stages:
         stage = None if name == "report" else stage_named(name)
         if stage is not None and stage.check is not None:
             stage.check(SettingsView(config, stage.settings, name))
-
-
-def own_effects(loaded: LoadedConfig) -> dict[str, str]:
-    """Return name -> class of the effects in the user's files, read without running them.
-
-    The name is empty if it is only known when the file is run; the class is `Effect`, `StructuralEffect`, or empty.
-
-    Raises
-    ------
-    UserError
-        If a file is missing, is not Python, or defines no EFFECT.
-    """
-    from mrpipe.pipeline.settings_view import setting_named
-
-    files = setting_named(loaded.config, "close_loop.effect_files")
-    if not files:
-        return {}
-    from mrpipe.effects.file_reading import effect_in_file
-
-    return {found.name: found.kind for found in map(effect_in_file, map(Path, files))}
-
-
-def _without_own_effects(loaded: LoadedConfig) -> RunSettings:
-    """Return the configuration without effect files, and without candidates that they may define."""
-    own = own_effects(loaded)
-    if not own:
-        return loaded.config
-    section: Any = loaded.config.close_loop  # type: ignore[attr-defined]
-    known = known_effects()
-    candidates = tuple(name for name in section.candidates if name in known or not (name in own or "" in own))
-    changed = section.model_copy(update={"effect_files": (), "candidates": candidates})
-    return loaded.config.model_copy(update={"close_loop": changed})
 
 
 def measured_campaigns(loaded: LoadedConfig) -> dict[str, Path]:
@@ -129,6 +98,7 @@ def check_headers(loaded: LoadedConfig) -> None:
     from mrpipe.campaigns import campaign_files
     from mrpipe.campaigns.files import not_found
     from mrpipe.campaigns.header import read_header
+    from mrpipe.cli.own_effects import own_effects
 
     for key, path in measured_campaigns(loaded).items():
         header = read_header(path)
@@ -155,7 +125,7 @@ def require_known_effects(header: CampaignHeader, own: Mapping[str, str] | None 
     header
         Head of the campaign.
     own
-        Name -> class of the user's own effects, as :func:`own_effects` returns them.
+        Name -> class of the user's own effects, as :func:`mrpipe.cli.own_effects.own_effects` returns them.
 
     Raises
     ------
@@ -231,6 +201,7 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
     """
     from mrpipe.campaigns import load_campaign
     from mrpipe.campaigns.plausibility import judge
+    from mrpipe.cli.own_effects import not_tried
 
     measured = measured_campaigns(loaded)
     result = CheckResult()
@@ -245,11 +216,15 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
         campaign = load_campaign(measured[key])
         result.campaigns[key] = f"{campaign.name}: {counted(len(campaign.recordings), 'test')}"
         result.notes[key] = list(campaign.findings)
+        judged = judge(campaign)
+        # where the clock is wrong, so are the durations
+        clock_is_wrong = any(item.channel == "time" and item.severity == "error" for item in judged)
         result.findings[key] = [
-            *judge(campaign),
-            *_too_short(loaded, campaign),
+            *judged,
+            *([] if clock_is_wrong else _too_short(loaded, campaign)),
             *_refused_by_stages(loaded, key, campaign),
             *_no_validation(loaded, key, campaign),
+            *not_tried(loaded, key),
         ]
         if key == "closed_loop":
             result.findings[key] += _without_law(campaign)
@@ -281,9 +256,9 @@ def _without_law(campaign: Campaign) -> list[Finding]:
 def _no_validation(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[Finding]:
     """Return a finding where close-loop will trace this structure and no test of it validates."""
     from mrpipe.campaigns.plausibility import Finding
-    from mrpipe.stages.close_loop_frame import variant
+    from mrpipe.cli.own_effects import traces_structure
 
-    if key == "bench" or "close-loop" not in loaded.config.stages or variant(loaded.config) is None:
+    if key == "bench" or not traces_structure(loaded):
         return []
     if not campaign.floor_masses_kg or any(test.role == "validation" for test in campaign.recordings):
         return []

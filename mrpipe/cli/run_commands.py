@@ -11,7 +11,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, one_config, with_common_options
 from mrpipe.errors import CheckFailed, StagesRefused, UserError
-from mrpipe.words import counted, shell_word
+from mrpipe.words import counted, shell_word, shortest
 
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Pipeline
@@ -250,7 +250,7 @@ def status(
         print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
     if any(reasons and not reasons[0].startswith("skipped") for reasons in found.values()):
         given = f" --campaign {shell_word(options.campaign)}" if options.campaign else ""
-        print(f"next: mrpipe run {shell_word(loaded.path)}{given} --run {shell_word(pipeline.run_directory)}")
+        print(f"next: mrpipe run {shell_word(shortest(loaded.path))}{given} --run {shell_word(pipeline.run_directory)}")
 
 
 def register(app: typer.Typer) -> None:

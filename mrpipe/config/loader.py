@@ -138,9 +138,17 @@ def _locate(path: Path) -> Path:
     if str(path) in {named.stem, f"configs/{named.name}"} and named.is_file():
         return named
     known = sorted(item.stem for item in config_directory().glob("*.yaml"))
-    similar = nearest(path.name.removesuffix(".yaml"), known)
-    remedy = f"give a YAML file, or one of {', '.join(known)}"
-    raise UserError(path, "", "no such configuration", similar if similar.startswith("did") else remedy)
+    # configurations of the user: in the folder of the path, and those of a project in the working directory
+    files = [item for folder in (path.parent, Path("configs")) for item in sorted(folder.glob("*.yaml"))]
+    own = {item.stem: str(item) for item in files if item.stem not in known}
+    remedy = f"give a YAML file, or one of {', '.join([*own.values(), *known])}"
+    meant = path.name.removesuffix(".yaml")
+    if meant in own:
+        remedy = f"did you mean {own[meant]}?"
+    elif (similar := nearest(meant, [*known, *own])).startswith("did"):
+        word = similar.removeprefix("did you mean ").removesuffix("?")
+        remedy = f"did you mean {own.get(word, word)}?"
+    raise UserError(path, "", "no such configuration", remedy)
 
 
 def _override_path(override: str) -> tuple[str, ...]:

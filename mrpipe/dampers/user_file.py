@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 from types import ModuleType
 
@@ -51,5 +52,15 @@ def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
         del sys.modules[name]
         # messages of a compiler are long: the first line names the fault
         said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
-        raise UserError(path, setting, f"cannot be run: {said}", "correct the file") from error
+        line = _line(error, path)
+        where = ", ".join(filter(None, (setting, f"line {line}" if line else "")))
+        raise UserError(path, where, f"cannot be run: {said}", "correct the file") from error
     return module
+
+
+def _line(error: Exception, path: Path) -> int:
+    """Return the last line of the file that led to an error; 0 if none is known."""
+    if isinstance(error, SyntaxError):
+        return error.lineno or 0
+    lines = [frame.lineno or 0 for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    return lines[-1] if lines else 0

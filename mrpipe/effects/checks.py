@@ -14,6 +14,7 @@ from typing import get_args
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.dampers.plant import (
     ACCELERATION,
     CHAIN_LENGTH,
@@ -101,8 +102,12 @@ def _unknown(effect: Effect, known: Sequence[str]) -> str:
         if kind not in get_args(TestKind)
     ]
     return "; ".join(
-        f"unknown {what}: {', '.join(words)}"
-        for what, words in (("needs", needs), ("effects", rivals), ("kinds of test", kinds))
+        f"unknown {what}: {', '.join(words)} ({right})"
+        for what, words, right in (
+            ("needs", needs, f"known: {', '.join(get_args(Needs))}"),
+            ("effects", rivals, nearest(rivals[0], known) if rivals else ""),
+            ("kinds of test", kinds, f"known: {', '.join(get_args(TestKind))}"),
+        )
         if words
     )
 

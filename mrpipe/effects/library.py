@@ -21,6 +21,12 @@ LOADS_FROM = ("mrpipe.effects",)
 """Packages whose modules are found at run time; they are part of the code version of a stage."""
 Kind = TypeVar("Kind")
 
+OF_STRUCTURE = (
+    "is an effect of a structure, and this is the tracing of a damper",
+    "trace it on a campaign of a structure, or leave its file out of close_loop.effect_files",
+)
+"""Problem and remedy where the tracing of a damper gets an effect of a structure."""
+
 
 def effects_in(place: ModuleType, kind: type[Kind]) -> list[Kind]:
     """Return the EFFECT of every module of a package that defines one of this kind."""
@@ -68,23 +74,16 @@ def load_effect_file(path: Path) -> Effect:
     Raises
     ------
     UserError
-        If the file is missing, cannot be run, or defines no EFFECT.
+        If the file is missing, cannot be run, or defines no EFFECT on a damper.
     """
+    from mrpipe.effects.structural.contract import StructuralEffect
+
     effect = effect_of_file(path)
+    if isinstance(effect, StructuralEffect):
+        raise UserError(path, "EFFECT", *OF_STRUCTURE)
     if not isinstance(effect, Effect):
         raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
     return effect
-
-
-def names_of_damper_effects(files: Sequence[Path]) -> set[str]:
-    """Return the names of the effects of those files of the user that define one on a damper.
-
-    Raises
-    ------
-    UserError
-        If a file is missing or cannot be run.
-    """
-    return {item.name for item in map(effect_of_file, files) if isinstance(item, Effect)}
 
 
 def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Effect]:

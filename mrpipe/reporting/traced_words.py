@@ -25,8 +25,19 @@ def determined(low: float, high: float) -> bool:
 
 def is_well_determined(entry: Mapping[str, Any]) -> bool:
     """Return whether the interval of a parameter is narrow; a parameter without an interval is taken as it is."""
-    low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+    low, high = uncertainty(entry)
     return bool(math.isfinite(high - low) and abs(high - low) <= WELL_DETERMINED * abs(entry["value"]))
+
+
+def uncertainty(entry: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the interval of a parameter that the data leave open; both ends are its value if the tracing gives none.
+
+    The range of a parameter over the storeys of a structure is none: it begins at 0 where a storey lacks the effect.
+    """
+    if entry.get("interval_kind") == "range" or not entry.get("interval"):
+        return entry["value"], entry["value"]
+    low, high = entry["interval"][:2]
+    return low, high
 
 
 def leading_first(effect: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import StageSkipped
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.effects.declared import declared_effects
-    from mrpipe.effects.library import damper_effects, names_of_damper_effects
-    from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+    from mrpipe.effects.library import damper_effects
+    from mrpipe.effects.structural import library as structural
     from mrpipe.reporting import close_loop_frame as section
     from mrpipe.tracing.options import tracing_options
     from mrpipe.tracing.structure.verdict import trace_structure
@@ -39,11 +40,13 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             "the masses of the floors are not given, or not all of them, so no storey force can be computed: "
             "write frame: {floor_masses_kg: [...]} in campaign.yaml"
         )
-    library = structural_effects(settings.candidates, settings.effect_files)
-    own = names_of_damper_effects(settings.effect_files)
+    own, of_damper = structural.effects_of_files(settings.effect_files)
+    library = structural.structural_effects(settings.candidates, own)
     for campaign in campaigns:
-        known = {**all_structural_effects(), **damper_effects(), **library}
-        declared_effects(campaign.declared_effects, known, campaign.file, own)
+        known = {**structural.all_structural_effects(), **damper_effects(), **library}
+        declared_effects(campaign.declared_effects, known, campaign.file, of_damper)
+    for name, path in of_damper.items():
+        context.warn(f"{path}: {name!r} is not tried: it {structural.NOT_TRIED}; {structural.TRACED_ON_BENCH}")
     asked = tracing_options(settings)
     # few long tests: fewer forms are refitted, and nothing filtered their force
     options = asked.changed(refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
@@ -56,6 +59,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         jobs=context.jobs,
         progress=context.progress,
     )
+    reasons = dict.fromkeys(of_damper, f"it {structural.NOT_TRIED}")
+    traced = replace(traced, summary={**traced.summary, "not_tried": reasons})
     for finding in traced.findings:
         context.warn(finding)
     _write(context, traced)

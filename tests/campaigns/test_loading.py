@@ -167,6 +167,11 @@ def test_a_faulty_channel_is_told_where_it_is_written(tmp_path: Path) -> None:
     assert "line 8, channels.displacement: has neither" in told(campaign(tmp_path / "a", channels=channels))
     tests = content()["tests"]
     tests[1]["channels"] = {"force": {"unit": "mm"}}
+    channels = {**CHANNELS, "drive": {"column": "i", "unit": "mv"}}
+    message = told(campaign(tmp_path / "c", channels=channels))
+    assert (
+        "campaign.yaml: line " in message and ", channels.drive: unit 'mv': is not a unit; did you mean mV?" in message
+    )
     assert ", tests[1].channels.force: unit 'mm': is not a unit of force" in told(campaign(tmp_path / "b", tests=tests))
 
 

@@ -15,8 +15,11 @@ import yaml
 from mrpipe.campaigns import TestFile, write_campaign
 from mrpipe.cli import run
 from mrpipe.config.loader import load_config
+from mrpipe.effects.library import OF_STRUCTURE, effect_of_file
+from mrpipe.effects.structural import library
 from mrpipe.errors import StageSkipped, UserError
 from mrpipe.stages import close_loop_frame
+from mrpipe.tracing.structure.verdict import StructureTracing
 from tests.campaigns.plausibility.rig import sound_tests
 
 CONFIG = """\
@@ -179,7 +182,7 @@ def test_the_next_command_of_status_keeps_the_campaign(
     monkeypatch.chdir(tmp_path)
     assert run(["status", "--config", config.name, "--campaign", "data"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith("next: mrpipe run ") and last.endswith("own.yaml --campaign data --run runs/own")
+    assert last == "next: mrpipe run own.yaml --campaign data --run runs/own"
 
 
 @pytest.mark.golden
@@ -202,6 +205,21 @@ def test_an_overload_value_is_no_measurement(tmp_path: Path, capsys: pytest.Capt
     force[777] = 9.9e37
     status, _, err = checked(capsys, str(project(tmp_path, [tests[0], replace(tests[1], force_n=force), *tests[2:]])))
     assert status == 2 and "test T1, force, row 777: is 9.9e+37, no measurement" in err
+
+
+@pytest.mark.planted
+def test_a_wrong_clock_is_named_once_and_not_with_every_test(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path)
+    file = tmp_path / "data" / "campaign.yaml"
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    content["channels"]["time"]["unit"] = "ms"
+    content.pop("sampling_rate_hz", None)
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    status, out, _ = checked(capsys, str(config))
+    assert status == 1 and "a sampling rate of 1e+06 Hz is implausibly high" in out
+    assert "but the filters of prepare need" not in out
 
 
 TOWER = """\
@@ -324,11 +342,40 @@ def test_a_users_effect_on_a_damper_that_a_structure_declares_is_refused_as_by_t
     with pytest.raises(UserError) as caught:
         close_loop_frame.variant(settings).run(context)  # type: ignore[union-attr, arg-type]
     assert str(caught.value) in err
-    # a file that is not declared may be there for a bench campaign
+    # a file that is not declared may be there for a bench campaign, but the structure does not use it
     content = yaml.safe_load((tmp_path / "data" / "campaign.yaml").read_text(encoding="utf-8"))
     content["declared_effects"] = ["joint-friction"]
     (tmp_path / "data" / "campaign.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
-    assert checked(capsys, str(config))[0] == 0
+    status, out, _ = checked(capsys, str(config))
+    assert status == 0
+    assert "warning: 'seal-squeeze' of close_loop.effect_files is an effect of your own on a damper" in out
+    assert "trace it on a bench campaign of the damper, or leave its file out of close_loop.effect_files" in out
+
+
+@pytest.mark.golden
+def test_close_loop_of_a_structure_says_that_a_users_effect_on_a_damper_is_not_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = Path(__file__).parents[2] / "docs" / "examples" / "seal_squeeze.py"
+    settings = load_config(tower(tmp_path), [f"close_loop.effect_files=[{own}]"]).config
+    loads: list[Path] = []
+
+    def load(path: Path) -> object:
+        loads.append(path)
+        return effect_of_file(path)
+
+    monkeypatch.setattr(library, "effect_of_file", load)
+    monkeypatch.setattr("mrpipe.tracing.structure.verdict.trace_structure", lambda *_, **__: StructureTracing({}))
+    monkeypatch.setattr("mrpipe.reporting.close_loop_frame.describe", lambda *_: None)
+    monkeypatch.setattr(close_loop_frame, "_write", lambda *_: None)
+    warnings: list[str] = []
+    inputs = {"campaign:frame": tmp_path / "data"}
+    rest = {"rng": None, "jobs": 1, "progress": None, "report": None}
+    context = SimpleNamespace(settings=settings, inputs=inputs, warn=warnings.append, **rest)
+    summary = close_loop_frame.variant(settings).run(context)  # type: ignore[union-attr, arg-type]
+    assert summary == {"not_tried": {"seal-squeeze": f"it {library.NOT_TRIED}"}}
+    assert f"{own}: 'seal-squeeze' is not tried: it {library.NOT_TRIED}; {library.TRACED_ON_BENCH}" in warnings
+    assert loads == [own]
 
 
 @pytest.mark.property
@@ -341,7 +388,11 @@ def test_effect_files_are_read_and_not_run(tmp_path: Path, capsys: pytest.Captur
     status, out, err = checked(capsys, *arguments)
     assert (status, err) == (0, "") and "valid" in out
     assert not (tmp_path / "ran").exists()
-    for content, expected in (("def (", "line 1: is not Python"), ("x = 1", "EFFECT: is missing")):
+    for content, expected in (
+        ("def (", "line 1: is not Python"),
+        ("x = 1", "EFFECT: is missing"),
+        ("EFFECT = StructuralEffect(name='squeeze')", f"EFFECT: {OF_STRUCTURE[0]}; {OF_STRUCTURE[1]}"),
+    ):
         own.write_text(content, encoding="utf-8")
         status, _, err = checked(capsys, *arguments)
         assert status == 2 and expected in err and err.count("\n") == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,18 @@ def test_missing_file_names_those_that_come_along(tmp_path: Path) -> None:
 def test_a_misspelt_name_names_the_nearest_configuration() -> None:
     with pytest.raises(UserError, match=r"thesi: no such configuration; did you mean thesis\?"):
         load_config(Path("thesi"))
+
+
+def test_a_misspelt_file_names_the_nearest_of_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "configs").mkdir()
+    (tmp_path / "configs" / "my-damper.yaml").write_text("seed: 1\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    meant = re.escape(str(Path("configs/my-damper.yaml")))
+    for wrong in ("configs/my-dampr.yaml", "my-damper", "my-damper.yaml"):
+        with pytest.raises(UserError, match=rf"no such configuration; did you mean {meant}\?"):
+            load_config(Path(wrong))
+    with pytest.raises(UserError, match=rf"give a YAML file, or one of {meant}, .*thesis"):
+        load_config(Path("configs/zzzzzz.yaml"))
 
 
 def test_file_that_is_not_text(tmp_path: Path) -> None:

@@ -40,6 +40,13 @@ def test_a_file_that_fails_leaves_no_module_behind(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be run: line one") as found:
         _load(path)
     assert "line two" not in str(found.value)
+    assert found.value.where == "close_loop.effect_files, line 1"
+    path.write_text("x = 1\n\ndef f(:\n", encoding="utf-8")
+    with pytest.raises(UserError, match=r"close_loop\.effect_files, line 3: cannot be run: "):
+        _load(path)
+    path.write_text("import math\n\nmath.sqrt(\n    -1.0\n)\n", encoding="utf-8")
+    with pytest.raises(UserError, match=r"close_loop\.effect_files, line 3: cannot be run: "):
+        _load(path)
     assert not {name for name in set(sys.modules) - before if "broken" in name}
 
 

@@ -89,8 +89,8 @@ def _searched(unit: str = "s", low: float = 0.1, high: float = 10.0, start: floa
 
 FAULTS = {
     "text": (replace(GOOD, physics=" "), "empty: physics"),
-    "needs": (replace(GOOD, needs=("wind",)), "unknown needs: wind"),  # type: ignore[arg-type]
-    "rival": (replace(GOOD, separated_by={"ofset": Separation("x")}), "unknown effects: ofset"),
+    "needs": (replace(GOOD, needs=("wind",)), "unknown needs: wind (known: varying-drive,"),  # type: ignore[arg-type]
+    "rival": (replace(GOOD, separated_by={"ofset": Separation("x")}), "unknown effects: ofset (did you mean offset?)"),
     "kind": (
         replace(GOOD, separated_by={"offset": Separation("x", ("kick",))}),  # type: ignore[arg-type]
         "kick (against offset)",

@@ -290,6 +290,10 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "empty.py").write_text("x = 1\n", encoding="utf-8")
     with pytest.raises(UserError, match="EFFECT"):
         load_effect_file(tmp_path / "empty.py")
+    of_structure = tmp_path / "impact.py"
+    of_structure.write_text("from mrpipe.effects.structural.impact import EFFECT\n")
+    with pytest.raises(UserError, match="EFFECT: is an effect of a structure, and this is the tracing of a damper"):
+        load_effect_file(of_structure)
     with pytest.raises(UserError, match=r"did you mean inertia\?"):
         effects_named(["inertja"])
 

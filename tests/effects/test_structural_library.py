@@ -8,7 +8,7 @@ import pytest
 
 from mrpipe.effects.library import all_effects
 from mrpipe.effects.structural.checks import checks_of
-from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+from mrpipe.effects.structural.library import all_structural_effects, effects_of_files, structural_effects
 from mrpipe.errors import UserError
 
 
@@ -20,7 +20,7 @@ def test_a_broken_file_is_a_users_mistake_in_one_line(tmp_path: Path, text: str)
     path = tmp_path / "own.py"
     path.write_text(text)
     with pytest.raises(UserError) as caught:
-        structural_effects((), [path])
+        effects_of_files([path])
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -35,7 +35,7 @@ def test_an_effect_meets_every_demand(name: str) -> None:
 @pytest.mark.property
 def test_a_missing_file_is_a_users_mistake(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such file"):
-        structural_effects((), [tmp_path / "none.py"])
+        effects_of_files([tmp_path / "none.py"])
 
 
 @pytest.mark.property
@@ -46,4 +46,6 @@ def test_an_effect_of_a_structure_and_one_of_a_damper_are_told_apart(tmp_path: P
         "EFFECT = replace(I, name='own-impact')\n"
     )
     damper.write_text("from mrpipe.effects.remanence import EFFECT\n")
-    assert set(structural_effects((), [own, damper])) == {*all_structural_effects(), "own-impact"}
+    of_structure, of_damper = effects_of_files([own, damper])
+    assert of_damper == {"remanence": damper}
+    assert set(structural_effects((), of_structure)) == {*all_structural_effects(), "own-impact"}

@@ -10,6 +10,7 @@ from functools import cache
 
 import mrpipe.campaigns.plausibility.checks as package
 from mrpipe.campaigns.model import Campaign
+from mrpipe.campaigns.plausibility.consequences import without_consequences
 from mrpipe.campaigns.plausibility.finding import Finding
 
 LOADS_FROM = ("mrpipe.campaigns.plausibility.checks",)
@@ -45,6 +46,9 @@ def all_checks() -> tuple[Check, ...]:
 
 
 def judge(campaign: Campaign) -> tuple[Finding, ...]:
-    """Return all findings of all checks that apply to the rig, errors first."""
+    """Return the findings of all checks that apply to the rig, errors first.
+
+    Findings on single tests that follow from a finding on the whole campaign are left out.
+    """
     found = [item for check in all_checks() if campaign.rig in check.rigs for item in check.judge(campaign)]
-    return tuple(sorted(found, key=lambda item: item.severity != "error"))
+    return tuple(sorted(without_consequences(found), key=lambda item: item.severity != "error"))

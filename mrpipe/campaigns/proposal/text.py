@@ -72,7 +72,8 @@ def campaign_text(
             for key in ("displacement", "force")
             if key not in channels
         ]
-    lines += [f"tests:   # {_comment(why)}"]
+    roles = next((item.removeprefix("roles: ") for item in unsure if item.startswith("roles: ")), "")
+    lines += [f"tests:{_doubt(roles) or f'   # {_comment(why)}'}"]
     for test in tests:
         entry = [f"name: {quoted(test.name)}", f"file: {quoted(test.file)}"]
         entry += [f"role: {test.role}"] if test.role else []

@@ -15,6 +15,12 @@ from mrpipe.errors import UserError
 LOADS_FROM = ("mrpipe.effects.structural",)
 """Packages whose modules are found at run time; they are part of the code version of a stage."""
 
+NOT_TRIED = "is an effect of your own on a damper, and the tracing of a structure tries only those of the program"
+"""Reason why the tracing of a structure leaves out an effect of `close_loop.effect_files`."""
+
+TRACED_ON_BENCH = "trace it on a bench campaign of the damper, or leave its file out of close_loop.effect_files"
+"""Remedy that belongs to :data:`NOT_TRIED`."""
+
 
 @cache
 def all_structural_effects() -> dict[str, StructuralEffect]:
@@ -23,26 +29,37 @@ def all_structural_effects() -> dict[str, StructuralEffect]:
     return {item.name: item for item in sorted(found, key=lambda item: item.name)}
 
 
-def load_structural_file(path: Path) -> StructuralEffect | None:
-    """Return the EFFECT of a file of a user if it is one of a structure; None if it is one of a damper.
+def effects_of_files(files: Sequence[Path]) -> tuple[list[StructuralEffect], dict[str, Path]]:
+    """Load the EFFECT of each file of a user once.
+
+    Returns
+    -------
+    effects of a structure
+        In the order of the files.
+    effects on a damper
+        Name -> file.
 
     Raises
     ------
     UserError
-        If the file is missing, cannot be run, or defines no EFFECT.
+        If a file is missing, cannot be run, or defines no EFFECT.
     """
-    effect = effect_of_file(path)
-    if isinstance(effect, StructuralEffect):
-        return effect
-    if not isinstance(effect, Effect):
-        remedy = "define EFFECT = StructuralEffect(...) as mrpipe/effects/structural/*.py do"
-        raise UserError(path, "EFFECT", "is missing", remedy)
-    return None
+    of_structure: list[StructuralEffect] = []
+    of_damper: dict[str, Path] = {}
+    for path in files:
+        effect = effect_of_file(path)
+        if isinstance(effect, StructuralEffect):
+            of_structure.append(effect)
+        elif isinstance(effect, Effect):
+            of_damper[effect.name] = path
+        else:
+            remedy = "define EFFECT = StructuralEffect(...) as mrpipe/effects/structural/*.py do"
+            raise UserError(path, "EFFECT", "is missing", remedy)
+    return of_structure, of_damper
 
 
-def structural_effects(names: Sequence[str] = (), files: Sequence[Path] = ()) -> dict[str, StructuralEffect]:
-    """Return the effects of these names (all if none of them is one of a structure), and those of the files."""
+def structural_effects(names: Sequence[str] = (), own: Sequence[StructuralEffect] = ()) -> dict[str, StructuralEffect]:
+    """Return the effects of these names (all if none of them is one of a structure), and those of the user."""
     known = all_structural_effects()
     chosen = {name: known[name] for name in names if name in known} or dict(known)
-    own = [item for item in map(load_structural_file, files) if item is not None]
     return {**chosen, **{item.name: item for item in own}}

@@ -71,7 +71,7 @@ def trust(facts: RunFacts) -> Section:
         text = f"Noise alone causes an error of {percent(loop['noise_floor_nrmse'])} "
         text += f"(estimated from {loop.get('noise_from', 'the sensors')})."
         if statements.proper_effects(loop) and recovered is not None:
-            text += f" The named effects recover {percent(recovered)} of what a flexible model of the residual can."
+            text += f" The named effects recover {percent(recovered)} of what a flexible model recovers of it."
         section.text(text)
         section.table(
             "rivals", tables.rivals(loop), "Effects that were tried, each alone with all parameters fitted again."

@@ -14,7 +14,7 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
-from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first, tie_in_words
+from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first, tie_in_words, uncertainty
 from mrpipe.reporting.words import percent, plain, quantity, with_interval
 from mrpipe.words import counted, duration, in_percent, listed, noun, number
 
@@ -157,7 +157,7 @@ def _value_of(effect: Mapping[str, Any]) -> str:
     """Return the leading parameter of an effect with its interval; a well-determined one leads."""
     place = f" at {effect['place']}" if effect.get("place") else ""
     for name, entry in leading_first(effect):
-        low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+        low, high = uncertainty(entry)
         level = f"{in_percent(entry.get('interval_level', 0.95))} interval"
         if 0.0 < abs(high - low) < 2.0 * NARROW * abs(entry["value"]):
             value = quantity(entry["value"], entry["unit"], 4)

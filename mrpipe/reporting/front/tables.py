@@ -11,7 +11,14 @@ import pandas as pd
 from mrpipe.dampers.model import DamperModel
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
-from mrpipe.reporting.traced_words import determined, exchanged_form, leading_first, shares_in_words, shown_candidates
+from mrpipe.reporting.traced_words import (
+    determined,
+    exchanged_form,
+    leading_first,
+    shares_in_words,
+    shown_candidates,
+    uncertainty,
+)
 from mrpipe.reporting.words import plain, quantity, readable_unit
 from mrpipe.words import number
 
@@ -95,7 +102,7 @@ def effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     rows = []
     for effect in effects:
         for name, entry in leading_first(effect):
-            low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+            low, high = uncertainty(entry)
             rows.append(
                 {
                     "effect": effect["name"] + (f" at {effect['place']}" if effect.get("place") else ""),

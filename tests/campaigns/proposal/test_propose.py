@@ -249,6 +249,9 @@ def test_channels_that_some_files_lack_belong_to_the_tests_that_have_them(tmp_pa
     # every open question is marked where it is to be answered
     marked = [line for line in proposal.text.splitlines() if "UNSURE" in line]
     assert any("geregelt_vd_1" in line for line in marked) and any("floor_masses_kg" in line for line in marked)
+    bench, _ = _proposed(bench_folder(tmp_path / "bench", 4, samples=400), tmp_path / "q" / "data" / "own")
+    roles = next(line.removeprefix("roles: ") for line in bench.unsure if line.startswith("roles: "))
+    assert f"tests:   # UNSURE: {roles}" in bench.text.splitlines()
 
 
 @pytest.mark.golden

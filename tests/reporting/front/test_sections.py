@@ -13,6 +13,7 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.dampers.model import write_damper
 from mrpipe.reporting.facts import RunFacts
+from mrpipe.reporting.front import tables
 from mrpipe.reporting.front.sections import _residual, sections
 from mrpipe.reporting.page import first_screen, write_report
 from tests.exports.test_models import with_effect
@@ -108,6 +109,15 @@ def test_report_of_a_structure_alone_lists_its_effects_with_the_structure(tmp_pa
     found = {section.anchor: section for section in sections(type(facts)(tmp_path, "tower", "", frame))}
     assert "damper" not in found
     assert {item["name"] for item in found["structure"].items if item["kind"] == "table"} >= {"modes", "effects"}
+
+
+def test_a_range_over_the_storeys_is_no_interval_of_a_parameter() -> None:
+    force = {"value": 14.1, "unit": "N", "interval": [0.0, 14.1], "interval_kind": "range", "by_storey": [0.0, 14.1]}
+    (row,) = tables.effects([{**EFFECT, "place": "storey 2", "parameters": {"force": force}}]).to_dict("records")
+    assert (row["value"], row["from"], row["to"]) == ("14.1", "-", "")
+    force |= {"interval": [12.0, 16.0], "interval_kind": "confidence"}
+    (row,) = tables.effects([{**EFFECT, "parameters": {"force": force}}]).to_dict("records")
+    assert (row["from"], row["to"]) == ("12.0", "16.0")
 
 
 def test_a_form_that_no_table_of_candidates_has_is_explained(tmp_path: Path) -> None:
