@@ -2,8 +2,8 @@
 
 The structure's linear part is exact for inputs that are linear between the ends of a step. The forces at the end of a
 step are found together with the motion there: damper by damper, repeated until no force changes. A brace has no mass;
-the rate of its deformation is the backward difference of second order, which damps motions that the step cannot
-resolve.
+the rate of its deformation and its acceleration are backward differences of second order, which damp motions that the
+step cannot resolve.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _motion_at_start(structure: Structure, state: FloatArray) -> Motion:
             known[d, X] += structure.positions[d, floor] * state[floor]
             known[d, V] += structure.positions[d, floor] * state[n + floor]
     return Motion(
-        known, np.zeros(k), np.zeros(k), np.zeros((k, 3)), np.zeros(k), np.zeros(k), added, np.zeros((k, 3)),
+        known, np.zeros(k), np.zeros(k), np.zeros((k, 4)), np.zeros(k), np.zeros(k), added, np.zeros((k, 3)),
         np.zeros((k, 8)),
     )  # fmt: skip
 
@@ -259,8 +259,10 @@ def _finish_step(
         known, braces = motion.known[d], motion.braces[d]
         deformation = settings[d, D_FLEXIBILITY] * motion.forces[d]
         rate = (3.0 * deformation - 4.0 * braces[0] + braces[1]) / (2.0 * dt)
-        motion.rod[d] = -(rate - braces[2]) / dt
-        braces[1], braces[0], braces[2] = braces[0], deformation, rate
+        # of second order too: a simple difference is half a step late, and the Kalman filter reads this acceleration
+        motion.rod[d] = -(3.0 * rate - 4.0 * braces[2] + braces[3]) / (2.0 * dt)
+        braces[1], braces[0] = braces[0], deformation
+        braces[3], braces[2] = braces[2], rate
         x, v = -deformation, -rate
         for floor in range(n):
             x += positions[d, floor] * free[floor]

@@ -160,7 +160,7 @@ class Motion(NamedTuple):
     forces, previous
         Forces now and at the step before [N], shape (k,).
     braces
-        Deformation of each brace now and at the step before [m], and its rate [m/s], shape (k, 3).
+        Deformation of each brace now and at the step before [m], and its rate at both [m/s], shape (k, 4).
     rod
         Acceleration of the rod of each damper by its brace [m/s^2], shape (k,).
     works

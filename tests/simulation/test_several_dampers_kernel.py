@@ -69,3 +69,19 @@ def test_the_rate_of_a_brace_is_exact_for_a_parabola_and_is_taken_from_the_dampe
     assert motion.known[:, V] == pytest.approx(given.positions @ free[FLOORS:] - np.array([0.2, -0.1]))
     assert motion.known[:, F] == pytest.approx(stiffness * deformation(0.0))
     assert motion.works == pytest.approx(0.5 * (before + motion.forces) * motion.known[:, X])
+
+
+def test_the_acceleration_of_a_rod_by_its_brace_is_exact_for_a_cubic() -> None:
+    """The filter of the controller reads it: a difference of the last two rates would be half a step late."""
+    rng = np.random.default_rng(6)
+    given = structure(rng)
+    motion = started(given, np.zeros(2 * FLOORS))
+    settings, dt, stiffness = np.zeros((DAMPERS, D_SIZE)), 0.01, np.array([2e4, 5e4])
+    settings[:, D_FLEXIBILITY] = 1.0 / stiffness
+    free = np.zeros(2 * FLOORS)
+    for step in range(-4, 1):
+        time = step * dt
+        deformation = np.array([0.2, -0.1]) * time + np.array([1.5, 4.0]) * time**2 + np.array([30.0, -20.0]) * time**3
+        motion.answer[:, 6] = stiffness * deformation
+        _finish_step.py_func(given.positions, given.at_end, settings, motion, free, dt)
+    assert motion.rod == pytest.approx([-3.0, -8.0])

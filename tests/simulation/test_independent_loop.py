@@ -1,0 +1,133 @@
+"""The loop of several dampers under sampled, clipped laws, against an integration that shares no code with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.control.controller import build_controller
+from mrpipe.control.controller_options import ControllerOptions
+from mrpipe.control.gains import Gains
+from mrpipe.control.inverse import inverse_table
+from mrpipe.control.kernel import COMMAND_DRIVE, COMMAND_FORCE
+from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.simulation.excitation import recorded
+from mrpipe.simulation.loop import LoopOptions
+from mrpipe.simulation.several_dampers import DampersResponse, LoopDamper, simulate_dampers
+from mrpipe.structures import Frame
+
+from .independent_loop import BoucWen, Device, Histories, Sampled, integrate
+
+SET_C = BoucWen(alpha=(19.92, 5.03, 20.03, -1.785), c0=(50.0, 75.0), A=3000.0, gamma=1230.0, beta=1230.0, eta=100.0)
+"""Numbers of configs/dampers/set-c.yaml, in the notation of the thesis."""
+MASSES, SPRINGS = (25.0, 20.0, 15.0), (3.0e4, 2.4e4, 1.8e4)
+M = np.diag(MASSES)
+K = np.diag(np.array(SPRINGS) + np.array([*SPRINGS[1:], 0.0]))
+K -= np.diag(SPRINGS[1:], 1) + np.diag(SPRINGS[1:], -1)
+C = 0.6 * M + 2e-4 * K
+TO_GROUND, BETWEEN = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 1.0])
+DURATION, INTERVAL, RATE, LIMIT, SWITCH = 1.6, 0.02, 200.0, 1.2, 40.0
+TIME = np.arange(0.0, DURATION + INTERVAL / 2, INTERVAL)
+GROUND = 6.0 * np.random.default_rng(5).standard_normal(TIME.size) * np.exp(-(((TIME - 0.8) / 0.6) ** 2))
+LAWS = (("vdps", 400.0, 3000.0), ("vdns", 250.0, -2500.0))
+"""Law, c [N s/m] and k [N/m] of the damper on the ground, and of the one between floors 2 and 3."""
+
+
+@dataclass(frozen=True)
+class Case:
+    velocity: tuple[str, str] = ("kalman", "difference")
+    brace: float = math.inf
+    delay: float = 0.0
+    driver: float = 0.0
+
+
+def by_package(case: Case, plant_rate: float) -> DampersResponse:
+    model = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    # so fine that the linear interpolation between its points does not count here
+    table = inverse_table(model, drive_limit=LIMIT, speeds=1001, drives=1601)
+    dampers = []
+    for (law, c, k), velocity, w, brace in zip(
+        LAWS, case.velocity, (TO_GROUND, BETWEEN), (math.inf, case.brace), strict=True
+    ):
+        options = ControllerOptions(rate_hz=RATE, velocity=velocity, residual_force_n=SWITCH, drive_limit=LIMIT)  # type: ignore[arg-type]
+        controller = build_controller(law, Gains(c_n_s_m=c, k_n_m=k), options, inverse=table, position=w)
+        dampers.append(LoopDamper(law, w, model.chain(), controller, brace_n_m=brace))
+    options = LoopOptions(
+        plant_rate_hz=plant_rate, record_rate_hz=RATE, delay_s=case.delay, driver_time_constant_s=case.driver
+    )
+    return simulate_dampers(Frame(M, C, K), dampers, recorded(TIME, GROUND), options)
+
+
+def independently(case: Case) -> Histories:
+    devices = [
+        Device(w, SET_C, Sampled(SET_C, c, k, RATE, LIMIT, SWITCH, 60.0, velocity), brace)
+        for (_, c, k), velocity, w, brace in zip(
+            LAWS, case.velocity, (TO_GROUND, BETWEEN), (math.inf, case.brace), strict=True
+        )
+    ]
+    return integrate(
+        M,
+        C,
+        K,
+        devices,
+        lambda t: float(np.interp(t, TIME, GROUND)),
+        DURATION,
+        delay=case.delay,
+        driver_s=case.driver,
+    )
+
+
+def differences(found: DampersResponse, expected: Histories) -> np.ndarray:
+    """Return the largest differences of floors, strokes, forces, drives, commands and desired forces.
+
+    Each is relative to the largest value of the quantity; that of drives and commands is their limit.
+    """
+    items = list(found.dampers.values())
+
+    def error(name: str, ours: list[np.ndarray], scale: float = 0.0) -> float:
+        theirs = getattr(expected, name)
+        difference = np.abs(np.column_stack(ours)[1:] - theirs[1:])
+        return float((difference.max(axis=0) / (scale or np.abs(theirs).max(axis=0))).max())
+
+    np.testing.assert_allclose(found.first.time_s, expected.time, atol=1e-12)
+    return np.array(
+        [
+            error("displacement", [found.first.displacement]),
+            error("stroke", [item.damper_displacement for item in items]),
+            error("force", [item.force for item in items]),
+            error("drive", [item.drive for item in items], LIMIT),
+            error("command", [item.commands[:, COMMAND_DRIVE] for item in items], LIMIT),
+            error("desired", [item.commands[:, COMMAND_FORCE] for item in items]),
+        ]
+    )
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(
+    "case",
+    [Case(), Case(delay=0.003, driver=0.01), Case(velocity=("kalman", "difference"), brace=5e4)],
+    ids=["at once", "delay and driver", "brace"],
+)
+def test_two_dampers_under_sampled_laws_equal_an_independent_integration(case: Case) -> None:
+    """The loop is of second order: half the step leaves a quarter of the difference, which is small already."""
+    expected = independently(case)
+    assert np.any(expected.command[:, 0] == LIMIT) and np.any(expected.command[:, 1] > 0.5), "the drive is limited"
+    assert 0.05 < np.mean(expected.desired == 0.0) < 0.5, "the laws are clipped"
+    coarse, fine = (differences(by_package(case, rate), expected) for rate in (4000.0, 8000.0))
+    assert np.all(fine < 0.3 * coarse)
+    assert np.all(fine < [2e-6, 4e-6, 3e-5, 3e-5, 3e-5, 3e-5])
+
+
+@pytest.mark.oracle
+def test_the_kalman_filter_of_a_braced_damper_reads_the_acceleration_of_the_rod() -> None:
+    """Force and rod of a braced damper move more abruptly, so that single samples have larger differences.
+
+    The acceleration of the rod is a difference over four steps, which is of first order where the rod reverses within.
+    """
+    case = Case(velocity=("kalman", "kalman"), brace=5e4)
+    error = differences(by_package(case, 8000.0), independently(case))
+    assert np.all(error < [2e-5, 8e-5, 4e-4, 2e-3, 2e-3, 1e-3])
