@@ -59,7 +59,13 @@ EFFECT = StructuralEffect(
             "F clip(drift since reversal / x_s)",
             (
                 shape(
-                    "slip_displacement", "m", "drift at which the joint slips", "stroke", 0.002, 0.2, (0.01, 0.05, 0.15)
+                    "slip_displacement",
+                    "m",
+                    "drift at which the joint slips",
+                    "stroke",
+                    1e-4,
+                    0.2,
+                    (0.001, 0.01, 0.05, 0.15),
                 ),
             ),
             (_FORCE,),
@@ -70,7 +76,11 @@ EFFECT = StructuralEffect(
         StructuralForm(
             "gradual-slip",
             "four slipping springs with limits of 1/2 to 4 x_s",
-            (shape("slip_displacement", "m", "drift around which slip begins", "stroke", 0.001, 0.1, (0.01, 0.05)),),
+            (
+                shape(
+                    "slip_displacement", "m", "drift around which slip begins", "stroke", 1e-4, 0.1, (0.001, 0.01, 0.05)
+                ),
+            ),
             (_FORCE,),
             slipping_step,
             5,
