@@ -105,11 +105,9 @@ def check(
         print(f"{named}: {verdict}, {counted(len(stages), 'stage')}")
         _print_findings(result, without)
         if not result.errors:
-            words: list[str | Path] = []
-            if options.config is not None or options.campaign is None:
-                words.append(options.config or shortest(loaded.path))
-            words += ["--campaign", options.campaign] if options.campaign else []
-            print("next: mrpipe run " + " ".join(shell_word(word) for word in words))
+            needs_config = options.config is not None or options.campaign is None
+            config = [shell_word(options.config or shortest(loaded.path))] if needs_config else []
+            print("next: mrpipe run " + " ".join([*config, *options.changes_in_words()]))
     if result.errors:
         raise CheckFailed(f"{named}: {count} in the measured data (listed above)")
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from mrpipe.errors import UserError
+from mrpipe.words import shell_word
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,14 @@ class CommonOptions:
     force: bool = False
     quiet: bool = False
     json: bool = False
+
+    def changes_in_words(self) -> list[str]:
+        """Return campaign, changed settings and seed as words of a command that can be copied into a shell."""
+        words: list[str | Path | int] = ["--campaign", self.campaign] if self.campaign else []
+        words += [word for file in self.settings for word in ("--settings", file)]
+        words += [word for change in self.overrides for word in ("--set", change)]
+        words += ["--seed", self.seed] if self.seed is not None else []
+        return [shell_word(str(word)) for word in words]
 
 
 _RUN = "Run directory. Default: runs/NAME, with the name of the configuration, or of the campaign of --campaign."

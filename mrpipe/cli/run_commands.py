@@ -249,8 +249,8 @@ def status(
     for name, reasons in found.items():
         print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
     if any(reasons and not reasons[0].startswith("skipped") for reasons in found.values()):
-        given = f" --campaign {shell_word(options.campaign)}" if options.campaign else ""
-        print(f"next: mrpipe run {shell_word(shortest(loaded.path))}{given} --run {shell_word(pipeline.run_directory)}")
+        words = [shell_word(shortest(loaded.path)), *options.changes_in_words()]
+        print(f"next: mrpipe run {' '.join(words)} --run {shell_word(pipeline.run_directory)}")
 
 
 def register(app: typer.Typer) -> None:

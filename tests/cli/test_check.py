@@ -175,6 +175,21 @@ def test_after_a_sound_campaign_the_next_command_has_it_too(
 
 
 @pytest.mark.golden
+def test_the_next_command_keeps_the_changed_settings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "more.yaml").write_text("prepare: {cutoff_hz: 50}\n")
+    given = ["--settings", "more.yaml", "--set", "prepare.working_rate_hz=200", "--set", "report.title=my rig"]
+    kept = "--settings more.yaml --set prepare.working_rate_hz=200 --set 'report.title=my rig' --seed 7"
+    status, out, _ = checked(capsys, config.name, *given, "--seed", "7")
+    assert status == 0 and out.splitlines()[-1] == f"next: mrpipe run {config.name} {kept}"
+    assert run(["status", "--config", config.name, *given, "--seed", "7"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"next: mrpipe run own.yaml {kept} --run runs/own"
+
+
+@pytest.mark.golden
 def test_the_next_command_of_status_keeps_the_campaign(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
