@@ -25,7 +25,7 @@ def without_consequences(findings: Sequence[Finding]) -> list[Finding]:
     def follows(item: Finding) -> bool:
         if not item.test:
             return False
-        small = item.name == "unit-decades" and item.numbers["factor_to_correct"] > 1.0
+        small = item.name == "unit-decades" and item.numbers.get("factor_to_correct", 1.0) > 1.0
         return (exchanged and item.name == "channels-exchanged") or (small and item.channel in too_large)
 
     return [item for item in findings if not follows(item)]
