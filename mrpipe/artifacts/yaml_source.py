@@ -36,20 +36,28 @@ _TYPES = {"str", "int", "float", "bool"}
 """Names by which pydantic distinguishes the types of a value that may have several."""
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a remedy that names the known words, the likeliest first."""
+def closest(word: str, known: Iterable[str]) -> str:
+    """Return the known word that a misspelt one most probably means; empty if none is close."""
     words = sorted(known)
     # the case of a unit matters, but its misspelling often is the case alone
     folded = {item.casefold(): item for item in words}
+    if str(word).casefold() in folded:
+        return folded[str(word).casefold()]
     close = difflib.get_close_matches(str(word), words, n=len(words) or 1, cutoff=0.5)
     # of equally close words, the first letter is rarely the wrong one: `Fx` is F and not x
     unlike = {item: -difflib.SequenceMatcher(a=item, b=str(word)).ratio() for item in close}
     close.sort(key=lambda item: (unlike[item], item[0].casefold() != str(word)[0].casefold(), item))
     # of words that are about equally close, letters in another order are the likeliest mistake
     turned = [item for item in close if sorted(item.casefold()) == sorted(str(word).casefold())]
-    same = folded.get(str(word).casefold())
-    if same or close:
-        return f"did you mean {same or (turned or close)[0]}?"
+    return next(iter(turned or close), "")
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return a remedy that names the known words, the likeliest first."""
+    words = sorted(known)
+    likeliest = closest(word, words)
+    if likeliest:
+        return f"did you mean {likeliest}?"
     return f"known: {', '.join(words)}" if words else "there are none"
 
 

@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mrpipe.artifacts import config_directory
-from mrpipe.artifacts.yaml_source import YamlSource, nearest, parse, read_yaml
+from mrpipe.artifacts.yaml_source import YamlSource, closest, nearest, parse, read_yaml
 from mrpipe.config.errors import explain, section_of
 from mrpipe.config.model import RunSettings, config_model, options
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
@@ -141,13 +141,10 @@ def _locate(path: Path) -> Path:
     # configurations of the user: in the folder of the path, and those of a project in the working directory
     files = [item for folder in (path.parent, Path("configs")) for item in sorted(folder.glob("*.yaml"))]
     own = {item.stem: str(item) for item in files if item.stem not in known}
-    remedy = f"give a YAML file, or one of {', '.join([*own.values(), *known])}"
     meant = path.name.removesuffix(".yaml")
-    if meant in own:
-        remedy = f"did you mean {own[meant]}?"
-    elif (similar := nearest(meant, [*known, *own])).startswith("did"):
-        word = similar.removeprefix("did you mean ").removesuffix("?")
-        remedy = f"did you mean {own.get(word, word)}?"
+    likeliest = meant if meant in own else closest(meant, [*known, *own])
+    every = f"give a YAML file, or one of {', '.join([*own.values(), *known])}"
+    remedy = f"did you mean {own.get(likeliest, likeliest)}?" if likeliest else every
     raise UserError(path, "", "no such configuration", remedy)
 
 
