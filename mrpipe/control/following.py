@@ -17,7 +17,8 @@ STEPS = 24
 MOST_HALVINGS = 10
 """A step after which two eigenvalues could be the followed one is halved this often at most."""
 ROUNDING = 1e-9
-"""Relative distance below which an eigenvalue equals the expected value, however near the next one is."""
+"""Relative distance below which an eigenvalue equals the expected value, however near the next one is, and below which
+two eigenvalues are equal."""
 CLEARLY_NEARER = 0.3
 """An eigenvalue is the followed one if its distance from the expected value is below this share of that of the next."""
 
@@ -56,8 +57,10 @@ def _step(eigenvalues: Eigenvalues, last: _Followed, share: float, halvings: int
     poles = eigenvalues(share)
     distances = np.abs(poles - (last.pole + last.slope * (share - last.share)))
     nearest = int(np.argmin(distances))
-    others = np.delete(distances, nearest)
-    is_expected = distances[nearest] <= ROUNDING * np.abs(poles[nearest])
+    rounding = ROUNDING * np.abs(poles[nearest])
+    # of equal eigenvalues, as those of a square building in its two directions, it does not matter which one is taken
+    others = distances[np.abs(poles - poles[nearest]) > rounding]
+    is_expected = distances[nearest] <= rounding
     if not is_expected and halvings < MOST_HALVINGS and np.any(CLEARLY_NEARER * others < distances[nearest]):
         middle = _step(eigenvalues, last, 0.5 * (last.share + share), halvings + 1)
         return _step(eigenvalues, middle, share, halvings + 1)

@@ -55,6 +55,22 @@ def test_rounding_of_two_equal_eigenvalues_divides_no_step() -> None:
     assert len(shares) == 25
 
 
+@pytest.mark.property
+def test_equal_eigenvalues_that_move_together_divide_no_step() -> None:
+    """Equal devices in the two directions of a square building keep the eigenvalues of both directions equal."""
+    shares = []
+
+    def pole(share: float) -> complex:
+        return 20j + 2j * share - 3.0 * share**2
+
+    def both(share: float) -> np.ndarray:
+        shares.append(share)
+        return pole(share) + np.array([0.0, 1e-12j, 9j])
+
+    assert followed_pole(both, 20j, 2j) == pytest.approx(pole(1.0), abs=1e-9)
+    assert len(shares) == 25
+
+
 @pytest.mark.oracle
 def test_the_pole_of_a_strongly_coupled_damper_is_that_of_a_fine_continuation() -> None:
     # two storeys of which the lower one has the damper: mode 1 becomes overdamped, and mode 2 the locked mode
