@@ -21,6 +21,15 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import Sensor
 from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_sensors
 
+FREQUENCY_RANGE = 0.03
+"""The logarithm of a frequency is searched within this distance from that of its first guess."""
+
+MOST_DAMPING = 0.5
+"""Largest damping ratio of the search."""
+
+INSIDE = 0.99
+"""A number that reaches this share of its bound is at the bound."""
+
 
 def _coherence(
     spectra: Sequence[RecordSpectrum],
@@ -75,11 +84,39 @@ def fit_modes(
     return collected(fit, spectra, fitted_poles(fit, guess, passes, evaluations))
 
 
+def fit_again(
+    spectra: Sequence[RecordSpectrum], before: MultiModeFit, *, passes: int, evaluations: int
+) -> MultiModeFit:
+    """Fit modes to changed spectra from their poles; only their residues if a pole leaves its mode.
+
+    A pole whose frequency or damping ratio ends at the bound of the search no longer describes its mode: it follows
+    what modes that are missing in the fit leave.
+
+    Parameters
+    ----------
+    spectra
+        Changed spectra.
+    before
+        Fit of the spectra before the change.
+    passes, evaluations
+        As for :func:`fit_modes`.
+    """
+    omega, zeta = before.angular_frequencies, before.damping_ratios
+    found = fit_modes(spectra, omega, zeta, passes=passes, evaluations=evaluations)
+    moved = np.abs(np.log(found.angular_frequencies / omega))
+    if np.all(moved < INSIDE * FREQUENCY_RANGE) and np.all(found.damping_ratios < INSIDE * MOST_DAMPING):
+        return found
+    theta = np.concatenate([np.log(omega), np.log(zeta)])
+    fit = ProjectedFit(spectra, omega.size)
+    fit.renew_weights(theta)
+    return collected(fit, spectra, theta)
+
+
 def fitted_poles(fit: ProjectedFit, guess: FloatArray, passes: int, evaluations: int) -> FloatArray:
     """Return theta = (ln omega, ln zeta) at the least cost, weights renewed from pass to pass."""
     theta, modes = guess, guess.size // 2
-    lower = np.concatenate([guess[:modes] - 0.03, np.full(modes, np.log(1e-6))])
-    upper = np.concatenate([guess[:modes] + 0.03, np.full(modes, np.log(0.5))])
+    lower = np.concatenate([guess[:modes] - FREQUENCY_RANGE, np.full(modes, np.log(1e-6))])
+    upper = np.concatenate([guess[:modes] + FREQUENCY_RANGE, np.full(modes, np.log(MOST_DAMPING))])
     for index in range(passes):
         result = least_squares(
             lambda t: fit.compressed(t)[:, -1],

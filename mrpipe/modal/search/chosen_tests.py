@@ -10,7 +10,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.modal.clocks.delays import SensorClock, added, corrected, estimate_clocks
-from mrpipe.modal.fit.multimode import fit_modes
+from mrpipe.modal.fit.multimode import fit_again
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
@@ -160,8 +160,7 @@ def _estimated(
         spectra = thinned([record_spectrum(test, band) for test in moved], _CLOCK_LINES)
         groups_of_spectra = [spectra] if len(fits) == 1 else [(item,) for item in spectra]
         fits = [
-            fit_modes(own, item.angular_frequencies, item.damping_ratios, passes=2, evaluations=10)
-            for item, own in zip(fits, groups_of_spectra, strict=True)
+            fit_again(own, item, passes=2, evaluations=10) for item, own in zip(fits, groups_of_spectra, strict=True)
         ]
     cost = 2.0 * max(len(total) - start, 1) * np.log(max(sum(item.residues.size for item in fits), 2))
     if total is clocks or _imaginary_part(fits, errors) + cost > before:

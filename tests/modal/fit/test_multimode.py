@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrpipe.modal.fit.lscf import stable_poles
-from mrpipe.modal.fit.multimode import fit_modes
+from mrpipe.modal.fit.multimode import FREQUENCY_RANGE, fit_again, fit_modes
 from mrpipe.modal.fit.projection import Problem
 from mrpipe.modal.spectra import averaged_responses, excited_band, record_spectrum
 from mrpipe.modal.verification import verify_in_frequency, verify_in_time
@@ -40,6 +42,22 @@ def test_fit_returns_poles_and_shapes(thesis):
     assert fit.damping_ratios == pytest.approx(truth.damping_ratios, rel=0.05)
     assert np.diag(modal_assurance(fit.residues.real, natural_modes(frame).mode_shapes)).min() > 0.9999
     assert fit.mode_coherence().min() > 0.99
+
+
+@pytest.mark.planted
+def test_a_pole_that_leaves_its_mode_for_a_missing_one_is_kept(thesis):
+    frame, _, spectrum = thesis
+    truth = complex_modes(frame)
+    omega, zeta = truth.angular_frequencies, truth.damping_ratios
+    complete = fit_modes([spectrum], omega, zeta)
+    same = fit_again([spectrum], complete, passes=2, evaluations=10)
+    assert same.angular_frequencies == pytest.approx(omega, rel=2e-4)
+    # a pole that was beyond the range of the search from the third mode runs to the end of this range
+    wrong = replace(complete, angular_frequencies=omega * [1.0, 1.0, 1.0 + 1.5 * FREQUENCY_RANGE, 1.0, 1.0])
+    kept = fit_again([spectrum], wrong, passes=2, evaluations=10)
+    assert kept.angular_frequencies == pytest.approx(wrong.angular_frequencies, rel=1e-12)
+    assert kept.damping_ratios == pytest.approx(complete.damping_ratios, rel=1e-12)
+    assert not np.allclose(kept.residues, complete.residues)
 
 
 @pytest.mark.property
