@@ -59,46 +59,6 @@ class BoucWen:
         return value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta)) + value(self.c0, drive) * speed
 
 
-@dataclass(frozen=True)
-class ModifiedBoucWen:
-    """P4 (1) to (5): a Bouc-Wen element with c0 and k0 behind a dashpot c1, and a spring k1 parallel to all of it.
-
-    f = c1(u) y' + k1 (x - x0), (c0 + c1) y' = alpha(u) z + c0 v + k0 (x - y), and z moves with v - y'.
-    """
-
-    alpha: Polynomial
-    c0: Polynomial
-    c1: Polynomial
-    k0: float
-    k1: float
-    x0: float
-    A: float
-    gamma: float
-    beta: float
-    eta: float
-    states: int = 3
-
-    def start(self, drive: float) -> list[float]:
-        return [0.0, 0.0, drive]
-
-    def answer(self, x: float, v: float, memory: np.ndarray, drive: float) -> tuple[float, list[float]]:
-        y, z, u = memory
-        c0, c1 = value(self.c0, u), value(self.c1, u)
-        dashpot = (value(self.alpha, u) * z + c0 * v + self.k0 * (x - y)) / (c0 + c1)
-        w = v - dashpot
-        rate = self.A * w - self.gamma * abs(w) * z * abs(z) - self.beta * w * z * z
-        return c1 * dashpot + self.k1 * (x - self.x0), [dashpot, rate, self.eta * (drive - u)]
-
-    def yielded(self, speed: float, drive: float) -> float:
-        """Return the force after yield; below the speed at which c1 carries the yield force, only c1 moves."""
-        c0, c1 = value(self.c0, drive), value(self.c1, drive)
-        total = value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta)) + c0 * speed
-        return min(c1 * speed, c1 / (c0 + c1) * total)
-
-
-Damper = BoucWen | ModifiedBoucWen
-
-
 def kalman_gains(displacement_noise: float, acceleration_noise: float, dt: float) -> np.ndarray:
     """Return the steady gains of the kinematic filter, by repeating its covariance equations until they settle."""
     A, G = np.array([[1.0, dt], [0.0, 1.0]]), np.array([0.5 * dt**2, dt])
@@ -121,7 +81,7 @@ class Sampled:
     desired force at the estimated speed.
     """
 
-    damper: Damper
+    damper: BoucWen
     c: float
     k: float
     rate: float
@@ -186,7 +146,7 @@ class Device:
     """A damper between two places of the structure, with its controller; `brace` [N/m] is in series with the damper."""
 
     w: np.ndarray
-    damper: Damper
+    damper: BoucWen
     controller: Sampled
     brace: float = math.inf
 

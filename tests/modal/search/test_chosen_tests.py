@@ -117,6 +117,6 @@ def test_clocks_are_corrected_where_a_mode_that_was_not_found_makes_shapes_compl
     late = SensorClock("a", forced[0].sensors[0], 1e-3, 1e-6)
     found = iter([[late], []])
     monkeypatch.setattr("mrpipe.modal.search.chosen_tests.estimate_clocks", lambda *_: next(found))
-    monkeypatch.setattr("mrpipe.modal.search.chosen_tests.fit_modes", lambda *_, **__: better)
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests.fit_again", lambda *_, **__: better)
     clocks, _ = _estimated(complex_fit, forced, [], False)
     assert clocks == [late]
