@@ -2,8 +2,7 @@
 
 The structure's linear part is exact for inputs that are linear between the ends of a step. The forces at the end of a
 step are found together with the motion there: damper by damper, repeated until no force changes. A brace has no mass;
-the rate of its deformation and its acceleration are backward differences of second order, which damp motions that the
-step cannot resolve.
+rate and acceleration of its deformation are backward differences of second order, which damp what no step resolves.
 """
 
 from __future__ import annotations
