@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -187,8 +187,9 @@ def _propose(
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
     unsure += _not_used(files)
-    tests, why, notes = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
-    unsure += [*_guessed_in_tests(tests), *notes]
+    found_tests = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
+    tests, doubt = found_tests.tests, found_tests.doubt
+    unsure += [*_guessed_in_tests(tests), *found_tests.notes, *([f"roles: {doubt}"] if doubt else [])]
     unused = sorted({column for item in files for column in item.layout.unused})
     has_clock = all("time" in item.layout.channels or item.file.time_s is not None for item in files)
     rated = has_clock or all(item.file.sampling_rate_hz for item in files)
@@ -201,7 +202,8 @@ def _propose(
         sampling_rate_hz=None if rated else 1000.0,
         channels=shared,
         tests=tests,
-        why=why,
+        why=found_tests.why,
+        doubt=doubt,
         unused=unused,
         unsure=unsure,
         skipped=skipped,
@@ -278,7 +280,16 @@ def _test_name(item: _File, folder: Path) -> str:
     return "-".join(filter(None, parts)).replace(" ", "_").strip(".") or "test"
 
 
-def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
+class _Tests(NamedTuple):
+    """Proposed tests, the source of their roles or kinds, open questions, and what is unsure about the roles."""
+
+    tests: list[TestText]
+    why: str
+    notes: list[str]
+    doubt: str
+
+
+def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> _Tests:
     notes = groups_taken([(item.path.name, item.group) for item in files])
     tests, conditions, without = [], [], []
     for item in files:
@@ -313,12 +324,10 @@ def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
             replace(tests[0], name=f"{tests[0].name}-1", role="training", segments=((float(first), middle),)),
             replace(tests[0], name=f"{tests[0].name}-2", role="validation", segments=((middle, float(last)),)),
         ]
-        notes.append("roles: one file only, so training and validation are parts of one record")
-        return tests, found.why, notes
+        return _Tests(tests, found.why, notes, "one file only, so training and validation are parts of one record")
     tests = [replace(test, role=role) for test, role in zip(tests, found.roles, strict=True)]
-    if "repeated" not in found.why and "names" not in found.why:
-        notes.append(f"roles: {found.why}")
-    return tests, found.why, notes
+    certain = "repeated" in found.why or "names" in found.why
+    return _Tests(tests, found.why, notes, "" if certain else found.why)
 
 
 def _drive_varies(files: list[_File], tests: Sequence[TestText]) -> bool:
@@ -344,7 +353,7 @@ def _condition(item: _File, own: dict[str, Guess]) -> Condition:
     return condition_of(np.nan_to_num(values) * size, np.nan_to_num(levels), item.rate)
 
 
-def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
+def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> _Tests:
     tests, notes = [], []
     kinds = [
         kind_of_record(_samples_of(item))
@@ -379,9 +388,9 @@ def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
             )
         )
     notes.append("frame: floor_masses_kg is not known; write the masses where they are known")
-    if "validation" not in roles:
-        notes.append("roles: no test repeats another, so none validates; close-loop needs a test with role validation")
-    return tests, "kinds from the names of the files where they state them", notes
+    unvalidated = "no test repeats another, so none validates; close-loop needs a test with role validation"
+    why = "kinds from the names of the files where they state them"
+    return _Tests(tests, why, notes, "" if "validation" in roles else unvalidated)
 
 
 def _samples_of(item: _File) -> dict[str, FloatArray]:

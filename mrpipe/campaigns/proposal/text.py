@@ -44,12 +44,13 @@ def campaign_text(
     channels: Mapping[str, Guess],
     tests: Sequence[TestText],
     why: str,
+    doubt: str,
     unused: Sequence[str],
     unsure: Sequence[str],
     skipped: Sequence[str],
     columns: Sequence[tuple[str, str, str]],
 ) -> str:
-    """Return the text of campaign.yaml."""
+    """Return the text of campaign.yaml; `why` gives the source of the roles, `doubt` what is unsure about them."""
     lines = [f"# Proposed by `mrpipe init --from` for the files in {directory}."]
     if unsure:
         lines += ["# CHECK THESE, because headers and samples do not settle them:"]
@@ -72,8 +73,7 @@ def campaign_text(
             for key in ("displacement", "force")
             if key not in channels
         ]
-    roles = next((item.removeprefix("roles: ") for item in unsure if item.startswith("roles: ")), "")
-    lines += [f"tests:{_doubt(roles) or f'   # {_comment(why)}'}"]
+    lines += [f"tests:{_doubt(doubt) or f'   # {_comment(why)}'}"]
     for test in tests:
         entry = [f"name: {quoted(test.name)}", f"file: {quoted(test.file)}"]
         entry += [f"role: {test.role}"] if test.role else []
