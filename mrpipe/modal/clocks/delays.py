@@ -23,11 +23,15 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest, Sensor
 from mrpipe.modal.spectra import RecordSpectrum
 
-_ITERATIONS = 4
+_ITERATIONS = 20
+_CONVERGED = 0.1
+"""Gauss-Newton has converged when no coefficient changes by more than this share of its standard error."""
 _SCAN_PHASE = 1.0
 """Step of the scan over constant delays: phase of the highest mode [rad]. Gauss-Newton converges from nearer."""
 _SCAN_STEPS = 16
 """Steps of the scan to each side."""
+_LARGEST_DRIFT = 50e-6
+"""Largest drift of the scan [1]. Quartz clocks are within 20 to 50 parts per million of the time."""
 _STEP_ITERATIONS = 1
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
@@ -95,9 +99,21 @@ class _SensorFit:
         self.omega = spectrum.omega
         self.spectrum = spectrum.responses[:, column]
 
-    def scanned(self, delays: FloatArray) -> FloatArray:
-        """Return the cost of each constant delay, shape (delays,), from a phase rotation (fast, approximate)."""
-        turned = stack(self.spectrum[:, None] * np.exp(1j * np.outer(self.omega, delays))) * self.weight
+    def scanned(self, delays: FloatArray, drift: float = 0.0) -> FloatArray:
+        """Return the cost of each delay at mid-record, shape (delays,), from a phase rotation (fast, approximate).
+
+        Parameters
+        ----------
+        delays
+            Delays at the middle of the record [s].
+        drift
+            Change of the delay per second [1].
+        """
+        spectrum = self.spectrum
+        if drift:
+            moved = self.time + drift * (self.time - self.time[-1] / 2.0)
+            spectrum = np.fft.rfft(self.record(np.clip(moved, self.time[0], self.time[-1])))[self.lines]
+        turned = stack(spectrum[:, None] * np.exp(1j * np.outer(self.omega, delays))) * self.weight
         along = self.q.T @ turned
         return np.asarray(np.sum(turned**2, axis=0) - np.sum(along**2, axis=0))
 
@@ -132,13 +148,15 @@ def _minimise(
 ) -> tuple[FloatArray, float, FloatArray]:
     """Return coefficients of the changes, the cost at them, and their standard errors (Gauss-Newton)."""
     value = start.copy()
-    for _ in range(iterations):
+    for iteration in range(iterations + 1):
         residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
-        value = value - np.linalg.lstsq(derivative, residual, rcond=None)[0]
-    residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
-    cost = float(residual @ residual)
-    variance = cost / max(residual.size - fit.q.shape[1], 1)
-    spread = np.sqrt(np.diag(np.linalg.pinv(derivative.T @ derivative)) * variance)
+        cost = float(residual @ residual)
+        variance = cost / max(residual.size - fit.q.shape[1], 1)
+        spread = np.sqrt(np.diag(np.linalg.pinv(derivative.T @ derivative)) * variance)
+        change = np.linalg.lstsq(derivative, residual, rcond=None)[0]
+        if iteration == iterations or np.all(np.abs(change) <= _CONVERGED * spread):
+            break
+        value = value - change
     return value, cost, spread
 
 
@@ -149,15 +167,43 @@ def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, float,
     sign. The minimum nearest to zero is replaced by another one only if that one predicts modes which were left out
     of its estimate better.
     """
-    ones = np.ones(fit.time.size)
-    offset, cost, spread = _minimise(fit, [ones], np.zeros(1))
     delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
     start = delays[int(np.argmin(fit.scanned(np.asarray(delays))))]
-    if abs(start - offset[0]) <= _SCAN_PHASE / highest or len(fit.left_out.rows) < 2:
-        return offset, cost, spread
-    other, other_cost, other_spread = _minimise(fit, [ones], np.array([start]))
-    costs = [fit.left_out_costs([([ones], value)]) for value in (other, offset)]
-    return (other, other_cost, other_spread) if fit.left_out.proves(*costs) else (offset, cost, spread)
+    return _better_minimum(fit, [np.ones(fit.time.size)], np.zeros(1), np.array([start]), _SCAN_PHASE / highest)
+
+
+def _drifting_delay(fit: _SensorFit, offset: FloatArray, highest: float) -> tuple[FloatArray, float, FloatArray]:
+    """Return the delay at the start and its drift, shape (2,), the cost, and the standard errors.
+
+    The minimum nearest to a constant delay is replaced only as in :func:`_constant_delay`. The scan covers drifts as
+    well, because a constant delay can be at a minimum that is wrong for a clock which drifts.
+    """
+    middle = float(fit.time[-1]) / 2.0
+    step = _SCAN_PHASE / (highest * middle)
+    count = int(_LARGEST_DRIFT / step)
+    delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
+    drifts = step * np.arange(-count, count + 1)
+    costs = np.array([fit.scanned(np.asarray(delays), float(drift)) for drift in drifts])
+    row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    start = np.array([delays[column] - drifts[row] * middle, drifts[row]])
+    near = np.array([offset[0], 0.0])
+    return _better_minimum(fit, [np.ones(fit.time.size), fit.time], near, start, _SCAN_PHASE / highest)
+
+
+def _better_minimum(
+    fit: _SensorFit, changes: Sequence[FloatArray], near: FloatArray, far: FloatArray, apart: float
+) -> tuple[FloatArray, float, FloatArray]:
+    """Return the minimum from the start `near`, or that from `far` if it predicts modes that were left out better.
+
+    Both starts lead to the same minimum if their delays differ by no more than `apart` [s].
+    """
+    first = _minimise(fit, changes, near)
+    between = np.tensordot(far - first[0], np.array(changes), axes=1)
+    if float(np.abs(between).max()) <= apart or len(fit.left_out.rows) < 2:
+        return first
+    second = _minimise(fit, changes, far)
+    costs = [fit.left_out_costs([(changes, item[0])]) for item in (second, first)]
+    return second if fit.left_out.proves(*costs) else first
 
 
 def _supported(fit: _SensorFit, better: float, worse: float, parameters: int) -> bool:
@@ -185,7 +231,7 @@ def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highe
     if fit.left_out.proves(own, simple) and _supported(fit, cost, simple_cost, 1):
         best = SensorClock(name, sensor, float(offset[0]), float(spread[0]))
         simple, simple_cost, free = own, cost, 0
-    value, drift_cost, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
+    value, drift_cost, spread = _drifting_delay(fit, offset, highest)
     drift = fit.left_out_costs([([ones, time], value)])
     changes = fit.left_out.proves(drift, simple) and _supported(fit, drift_cost, simple_cost, 1 + free)
     stepping = _step(fit, offset) if steps else None

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrpipe.modal.clocks.delays import SensorClock, added, corrected, estimate_clocks, expected_clocks
 from mrpipe.modal.fit.multimode import fit_modes
-from mrpipe.modal.records import FrameTest, Sensor
+from mrpipe.modal.records import FrameTest, Place, Sensor
 from mrpipe.modal.spectra import record_spectrum
 from mrpipe.structures import complex_modes, frame_from_parameter_set
 from tests.modal.rig import Rig, random_test, sweep_test
@@ -84,6 +87,29 @@ def test_a_planted_delay_is_estimated_and_the_others_are_zero(delay_s: float) ->
     # whatever form the delay takes, it has the same size from the first to the last second
     assert found[3].delay(np.linspace(0.0, 100.0, 11)) == pytest.approx(np.full(11, delay_s), abs=5e-4)
     assert all(found[floor].is_zero for floor in (1, 2, 4, 5))
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(
+    ("excited", "noise", "offset_s", "drift"),
+    [
+        pytest.param(random_test, 0.03, -0.06, 9.6e-5, id="slow convergence"),
+        pytest.param(sweep_test, 0.1, -0.0409, -7.96e-5, id="another minimum without a scan over drifts"),
+    ],
+)
+def test_a_drift_of_several_radians_at_the_highest_mode_is_estimated(
+    excited: Callable[..., FrameTest], noise: float, offset_s: float, drift: float
+) -> None:
+    frame = frame_from_parameter_set("thesis")
+    test = excited(frame, np.random.default_rng(1), Rig(noise=noise, rate=90.0, sweep_s=1000.0))
+    kept = replace(test, responses=test.responses[:, [2]], is_displacement=(False,), places=(Place(3),))
+    spoiled = corrected(kept, [SensorClock(kept.name, kept.sensors[0], -offset_s, 0.0, -drift)])
+    truth = complex_modes(frame)
+    spectra = [record_spectrum(spoiled, (0.2, 14.0))]
+    fit = fit_modes(spectra, truth.angular_frequencies, truth.damping_ratios, passes=1)
+    (found,) = estimate_clocks(fit, [spoiled])
+    expected = offset_s + drift * np.array([0.0, 1000.0])
+    assert found.delay(np.array([0.0, 1000.0])) == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.mark.planted
