@@ -24,6 +24,7 @@ from mrpipe.modal.records import FrameTest, Sensor
 from mrpipe.modal.spectra import RecordSpectrum
 
 _ITERATIONS = 20
+"""Largest number of steps of Gauss-Newton."""
 _CONVERGED = 0.1
 """Gauss-Newton has converged when no coefficient changes by more than this share of its standard error."""
 _SCAN_PHASE = 1.0
@@ -33,6 +34,7 @@ _SCAN_STEPS = 16
 _LARGEST_DRIFT = 50e-6
 """Largest drift of the scan [1]. Quartz clocks are within 20 to 50 parts per million of the time."""
 _STEP_ITERATIONS = 1
+"""Steps of Gauss-Newton for each place of a step of the clock; only the best place is refined."""
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
 LEAST_PHASE = 0.02
@@ -167,8 +169,8 @@ def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, float,
     sign. The minimum nearest to zero is replaced by another one only if that one predicts modes which were left out
     of its estimate better.
     """
-    delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
-    start = delays[int(np.argmin(fit.scanned(np.asarray(delays))))]
+    delays = _scan_steps(highest)
+    start = delays[int(np.argmin(fit.scanned(delays)))]
     return _better_minimum(fit, [np.ones(fit.time.size)], np.zeros(1), np.array([start]), _SCAN_PHASE / highest)
 
 
@@ -181,13 +183,17 @@ def _drifting_delay(fit: _SensorFit, offset: FloatArray, highest: float) -> tupl
     middle = float(fit.time[-1]) / 2.0
     step = _SCAN_PHASE / (highest * middle)
     count = int(_LARGEST_DRIFT / step)
-    delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
-    drifts = step * np.arange(-count, count + 1)
-    costs = np.array([fit.scanned(np.asarray(delays), float(drift)) for drift in drifts])
+    delays, drifts = _scan_steps(highest), step * np.arange(-count, count + 1)
+    costs = np.array([fit.scanned(delays, float(drift)) for drift in drifts])
     row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
     start = np.array([delays[column] - drifts[row] * middle, drifts[row]])
     near = np.array([offset[0], 0.0])
     return _better_minimum(fit, [np.ones(fit.time.size), fit.time], near, start, _SCAN_PHASE / highest)
+
+
+def _scan_steps(highest: float) -> FloatArray:
+    """Return the delays of the scan [s] for the highest angular frequency [rad/s]."""
+    return np.asarray(_SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1))
 
 
 def _better_minimum(

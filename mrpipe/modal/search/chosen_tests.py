@@ -107,7 +107,9 @@ def with_clocks(
     """Correct the clocks of the sensors if this makes the mode shapes real, and search the modes again.
 
     The modes are searched again after the correction, and the clocks are estimated again with these modes, because a
-    mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear.
+    mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear. With
+    other modes the estimate begins with the records as measured: a drift that was wrong because modes were missing
+    would otherwise leave a rest that is neither a drift nor a step.
 
     Steps are searched only after the modes, because a sweep passes the modes one after another: a mode that was not
     found disturbs the phases from a certain time on, like a step.
@@ -115,11 +117,14 @@ def with_clocks(
     clocks: list[SensorClock] = []
     best = chosen
     stepped = False
+    modes = 0
     for attempt in range(_SEARCHES):
         incomplete = layout.is_chain and len(best.search.numbers) < layout.floors
         steps = not stepped and (attempt > 0 or not incomplete)
         stepped = stepped or steps
-        more, moved = _estimated(best.search.fit, chosen.tests, clocks, steps)
+        start = clocks if len(best.search.numbers) == modes else []
+        modes = len(best.search.numbers)
+        more, moved = _estimated(best.search.fit, chosen.tests, start, len(clocks), steps)
         if more is None:
             if stepped:
                 break
@@ -136,16 +141,29 @@ def with_clocks(
 
 
 def _estimated(
-    fit: MultiModeFit, tests: tuple[FrameTest, ...], clocks: list[SensorClock], steps: bool
+    fit: MultiModeFit, tests: tuple[FrameTest, ...], start: list[SensorClock], known: int, steps: bool
 ) -> tuple[list[SensorClock] | None, tuple[FrameTest, ...]]:
-    """Return the delays of the sensors and the corrected tests; None where no further delay makes the shapes real."""
+    """Return the delays of the sensors and the corrected tests; None if the shapes do not become more real.
+
+    Parameters
+    ----------
+    fit
+        A fit of the tests after the correction of the delays known so far.
+    tests
+        The tests as measured.
+    start
+        Delays to begin with.
+    known
+        Number of the delays known so far.
+    steps
+        Whether a delay may have a step.
+    """
     fits = _fits(fit)
     # correct clocks also reduce the errors of the residues, so that their own errors would let a shape that another
     # cause makes complex, such as a mode that was not found, seem more complex than before
     errors = [item.residue_errors for item in fits]
     before = _imaginary_part(fits, errors)
-    start = len(clocks)
-    total = clocks
+    total = start
     moved = tuple(corrected(test, total) for test in tests)
     for round_number in range(_CLOCK_ROUNDS):
         groups = [moved] if len(fits) == 1 else [(test,) for test in moved]
@@ -162,8 +180,8 @@ def _estimated(
         fits = [
             fit_again(own, item, passes=2, evaluations=10) for item, own in zip(fits, groups_of_spectra, strict=True)
         ]
-    cost = 2.0 * max(len(total) - start, 1) * np.log(max(sum(item.residues.size for item in fits), 2))
-    if total is clocks or _imaginary_part(fits, errors) + cost > before:
+    cost = 2.0 * max(len(total) - known, 1) * np.log(max(sum(item.residues.size for item in fits), 2))
+    if total is start or _imaginary_part(fits, errors) + cost > before:
         return None, tests
     return total, moved
 
