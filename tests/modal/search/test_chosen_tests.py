@@ -105,6 +105,28 @@ def test_steps_of_clocks_wait_until_all_modes_are_found(monkeypatch: pytest.Monk
     assert (3, True) in allowed
 
 
+def test_with_other_modes_clocks_are_estimated_again_from_the_records_as_measured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A drift that was wrong because modes were missing would leave a rest that is neither a drift nor a step."""
+    forced = (_sweep("a", "training"),)
+    chosen, _ = choose_tests(forced, _tests(*forced), LAYOUT, OPTIONS)
+    incomplete = replace(
+        chosen, search=replace(chosen.search, fit=chosen.search.fit.only([0, 1]), numbers=chosen.search.numbers[:2])
+    )
+    as_measured: list[tuple[int, bool]] = []
+
+    def seen(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool = True) -> list[SensorClock]:
+        as_measured.append((fit.angular_frequencies.size, np.array_equal(tests[0].responses, forced[0].responses)))
+        return [SensorClock("a", tests[0].sensors[0], 1e-3, 1e-6)] if len(as_measured) in (1, 3) else []
+
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests.estimate_clocks", seen)
+    monkeypatch.setattr("mrpipe.modal.search.chosen_tests._imaginary_part", lambda *_: 1e6 - 1e3 * len(as_measured))
+    with_clocks(incomplete, _tests(*forced), LAYOUT, OPTIONS)
+    # two rounds with two modes, then two with three modes; the first round of each sees the records as measured
+    assert as_measured[:4] == [(2, True), (2, False), (3, True), (3, False)]
+
+
 def test_clocks_are_corrected_where_a_mode_that_was_not_found_makes_shapes_complex(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -118,5 +140,5 @@ def test_clocks_are_corrected_where_a_mode_that_was_not_found_makes_shapes_compl
     found = iter([[late], []])
     monkeypatch.setattr("mrpipe.modal.search.chosen_tests.estimate_clocks", lambda *_: next(found))
     monkeypatch.setattr("mrpipe.modal.search.chosen_tests.fit_again", lambda *_, **__: better)
-    clocks, _ = _estimated(complex_fit, forced, [], False)
+    clocks, _ = _estimated(complex_fit, forced, [], 0, False)
     assert clocks == [late]
