@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.control.calibration import CalibrationOptions, balanced_weights
-from mrpipe.control.placed import calibrate_placed, modes_together
+from mrpipe.control.placed import PlacedCalibration, calibrate_placed, modes_together
 from mrpipe.control.placed_storage import damper_as_json, placed_dampers, together_as_json, write_placed
 from mrpipe.structures import shear_frame, write_frame
 from mrpipe.structures.options import StructureSettings
@@ -29,9 +30,15 @@ TWO = structure(
 )
 
 
+@functools.cache
+def _calibrated(settings: str) -> list[PlacedCalibration]:
+    dampers = StructureSettings.model_validate_json(settings).dampers
+    return calibrate_placed(FRAME, placed_dampers(FRAME, dampers, 1), CalibrationOptions())
+
+
 def write_artifacts(folder: Path, settings: StructureSettings = TWO) -> dict[str, Artifact]:
     """Write frame.h5 and control.h5 as the stages do and return stage -> artifact."""
-    found = calibrate_placed(FRAME, placed_dampers(FRAME, settings.dampers, 1), CalibrationOptions())
+    found = _calibrated(settings.model_dump_json())
     rows = [damper_as_json(item, AMPLITUDE_M, RESIDUAL_N, 0.01) for item in found]
     weights = [balanced_weights(FRAME, item.damper.position, item.modes, RESIDUAL_N) for item in found]
     together = together_as_json(FRAME, modes_together(FRAME, found, [1, 2]), [1, 2])

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+
+from .independent_control import Central, Perfect, Requested, Sampled
 
 Polynomial = tuple[float, ...]
 """Coefficients of a polynomial of the drive, constant first."""
@@ -59,94 +60,12 @@ class BoucWen:
         return value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta)) + value(self.c0, drive) * speed
 
 
-def kalman_gains(displacement_noise: float, acceleration_noise: float, dt: float) -> np.ndarray:
-    """Return the steady gains of the kinematic filter, by repeating its covariance equations until they settle."""
-    A, G = np.array([[1.0, dt], [0.0, 1.0]]), np.array([0.5 * dt**2, dt])
-    Q = acceleration_noise**2 * np.outer(G, G)
-    P, gains = Q.copy(), np.zeros(2)
-    for _ in range(20000):
-        before = gains
-        gains = P[:, 0] / (P[0, 0] + displacement_noise**2)
-        P = A @ (P - np.outer(gains, P[0])) @ A.T + Q
-        if np.abs(gains - before).max() < 1e-14 * np.abs(gains).max():
-            break
-    return gains
-
-
-@dataclass
-class Sampled:
-    """A controller of Figure 5.3: velocity, force, inverse, switch P2 (24), low-pass, limits.
-
-    The force is c v + k x, clipped by P2 (22). The inverse is the drive at which the damper, after yield, has the
-    desired force at the estimated speed.
-    """
-
-    damper: BoucWen
-    c: float
-    k: float
-    rate: float
-    limit: float
-    switch: float
-    low_pass_hz: float | None
-    velocity: str
-    noise: tuple[float, float] = (20e-6, 0.1)
-    estimate: tuple[float, float] | None = None
-    last: tuple[float, float] = (0.0, 0.0)
-    asked: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    given: list[float] = field(default_factory=lambda: [0.0, 0.0])
-
-    def __post_init__(self) -> None:
-        self.gains = kalman_gains(*self.noise, 1.0 / self.rate)
-
-    def command(self, x: float, a: float) -> tuple[float, float]:
-        """Return the drive and the desired force, from displacement [m] and acceleration [m/s^2] of the damper."""
-        position, speed = self.moved(x, a)
-        force = self.c * speed + self.k * position
-        if force * speed < 0.0:
-            force = 0.0
-        drive = 0.0 if abs(force) < self.switch else self.inverse(abs(speed), abs(force))
-        return min(max(self.filtered(drive), 0.0), self.limit), force
-
-    def moved(self, x: float, a: float) -> tuple[float, float]:
-        dt = 1.0 / self.rate
-        if self.estimate is None:
-            self.estimate = (x, 0.0)
-        elif self.velocity == "difference":
-            self.estimate = (x, (x - self.last[0]) / dt)
-        else:
-            mean = 0.5 * (a + self.last[1])
-            ahead = self.estimate[0] + dt * self.estimate[1] + 0.5 * dt**2 * mean
-            error = x - ahead
-            self.estimate = (ahead + self.gains[0] * error, self.estimate[1] + dt * mean + self.gains[1] * error)
-        self.last = (x, a)
-        return self.estimate
-
-    def inverse(self, speed: float, force: float) -> float:
-        if self.damper.yielded(speed, 0.0) >= force:
-            return 0.0
-        if self.damper.yielded(speed, self.limit) <= force:
-            return self.limit
-        return float(brentq(lambda u: self.damper.yielded(speed, u) - force, 0.0, self.limit, xtol=1e-13))
-
-    def filtered(self, drive: float) -> float:
-        """Butterworth low-pass of second order by the bilinear transform, with the frequency of the cut-off exact."""
-        if self.low_pass_hz is None:
-            return drive
-        w = math.tan(math.pi * self.low_pass_hz / self.rate)
-        scale = 1.0 + math.sqrt(2.0) * w + w * w
-        total = w * w * (drive + 2.0 * self.asked[0] + self.asked[1])
-        total -= 2.0 * (w * w - 1.0) * self.given[0] + (1.0 - math.sqrt(2.0) * w + w * w) * self.given[1]
-        result = total / scale
-        self.asked, self.given = [drive, self.asked[0]], [result, self.given[0]]
-        return result
-
-
 @dataclass
 class Device:
     """A damper between two places of the structure, with its controller; `brace` [N/m] is in series with the damper."""
 
     w: np.ndarray
-    damper: BoucWen
+    damper: BoucWen | Perfect
     controller: Sampled
     brace: float = math.inf
 
@@ -210,6 +129,7 @@ class Loop:
             force, rates = item.damper.answer(stroke, speed, memory, drive)
             return force, stroke, speed, drive, [*rates, *driver]
         rod = own[item.damper.states]
+        assert isinstance(item.damper, BoucWen), "a perfect damper has no brace"
         force = item.brace * (stroke - rod)
         speed = item.damper.velocity(force, rod, memory)
         return force, rod, speed, drive, [*item.damper.rates(speed, memory, drive), speed, *driver]
@@ -226,6 +146,10 @@ class Loop:
         pull = self.W.T @ [part[0] for part in parts]
         acceleration = self.inverse @ (-self.C @ v - self.K @ y[: self.n] - pull) - self.ground(t)
         return np.concatenate([v, acceleration, *(part[4] for part in parts)])
+
+    def floor_accelerations(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return the absolute acceleration of each floor."""
+        return np.asarray(self.slope(t, y)[self.n : 2 * self.n] + self.ground(t))
 
     def rod_accelerations(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the acceleration of each rod; behind a brace it is the change of its speed along the solution."""
@@ -248,12 +172,18 @@ def integrate(
     *,
     delay: float = 0.0,
     driver_s: float = 0.0,
+    central: Central | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-11,
 ) -> Histories:
-    """Integrate the loop from rest; a command acts `delay` after its sample, and the first one acts before, too."""
+    """Integrate the loop from rest; a command acts `delay` after its sample, and the first drive acts before, too.
+
+    `central` is the regulator of the dampers with the law `Requested`.
+    """
     loop = Loop(M, C, K, devices, ground, driver_s)
     rate = devices[0].controller.rate
+    regulated = [d for d, item in enumerate(devices) if isinstance(item.controller.law, Requested)]
+    desired = np.zeros(len(devices))
     samples = round(duration * rate) + 1
     rows: list[tuple[np.ndarray, ...]] = []
     y = loop.start()
@@ -265,13 +195,19 @@ def integrate(
 
     for sample in range(samples):
         t = sample / rate
-        across = loop.rod_accelerations(t, y)
+        across, parts = loop.rod_accelerations(t, y), loop.parts(y)
+        if central is not None:
+            readings = [*(parts[d][1] for d in regulated), *loop.floor_accelerations(t, y)[central.floors]]
+            wanted = central.forces(ground(t), np.array(readings), desired[regulated])
+            for d, force in zip(regulated, wanted, strict=True):
+                devices[d].controller.law = Requested(float(force))
         answers = [
-            item.controller.command(part[1], a) for item, part, a in zip(devices, loop.parts(y), across, strict=True)
+            item.controller.command(part[1], part[2], a) for item, part, a in zip(devices, parts, across, strict=True)
         ]
         commands, desired = (np.array(column) for column in zip(*answers, strict=True))
         if sample == 0:
-            loop.held[:] = commands
+            # a perfect damper has no force before
+            loop.held[:] = [drive * (item.damper.states > 0) for item, drive in zip(devices, commands, strict=True)]
             y = loop.start()
         forces, strokes, _, drives, _ = zip(*loop.parts(y), strict=True)
         rows.append((y[: loop.n], np.array(forces), np.array(drives), commands, desired, np.array(strokes)))
