@@ -60,12 +60,50 @@ class BoucWen:
         return value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta)) + value(self.c0, drive) * speed
 
 
+@dataclass(frozen=True)
+class ModifiedBoucWen:
+    """Paper P4 (1) to (5): f = c1 y' + k1 (x - x0), (c0 + c1) y' = alpha z + c0 x' + k0 (x - y), u' = eta (I - u).
+
+    Its memory is y, z and the voltage u at the damper. The numbers are those of Table 1 of the paper.
+    """
+
+    alpha: Polynomial = (46.2e3, 41.2e3)
+    c0: Polynomial = (110.0e3, 114.3e3)
+    c1: Polynomial = (8359.2e3, 7482.9e3)
+    k0: float = 2.0
+    k1: float = 9.7
+    x0: float = 0.18
+    A: float = 1107.2
+    gamma: float = 164.0
+    beta: float = 164.0
+    eta: float = 100.0
+    states: int = 3
+
+    def start(self, drive: float) -> list[float]:
+        return [0.0, 0.0, drive]
+
+    def answer(self, x: float, v: float, memory: np.ndarray, drive: float) -> tuple[float, list[float]]:
+        """Return the force [N] and the rates of the memory."""
+        y, z, u = memory
+        c0, c1 = value(self.c0, u), value(self.c1, u)
+        rate = (value(self.alpha, u) * z + c0 * v + self.k0 * (x - y)) / (c0 + c1)
+        w = v - rate
+        hysteresis = self.A * w - self.gamma * abs(w) * z * abs(z) - self.beta * w * z * z
+        return c1 * rate + self.k1 * (x - self.x0), [rate, hysteresis, self.eta * (drive - u)]
+
+    def yielded(self, speed: float, drive: float) -> float:
+        """Return the force at constant speed and drive, after yield [N]; c1 alone gives way to a slow motion."""
+        c0, c1 = value(self.c0, drive), value(self.c1, drive)
+        plastic = value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta))
+        return min(c1 * speed, c1 * (plastic + c0 * speed) / (c0 + c1))
+
+
 @dataclass
 class Device:
     """A damper between two places of the structure, with its controller; `brace` [N/m] is in series with the damper."""
 
     w: np.ndarray
-    damper: BoucWen | Perfect
+    damper: BoucWen | ModifiedBoucWen | Perfect
     controller: Sampled
     brace: float = math.inf
 
@@ -129,7 +167,7 @@ class Loop:
             force, rates = item.damper.answer(stroke, speed, memory, drive)
             return force, stroke, speed, drive, [*rates, *driver]
         rod = own[item.damper.states]
-        assert isinstance(item.damper, BoucWen), "a perfect damper has no brace"
+        assert isinstance(item.damper, BoucWen), "this damper has no brace here"
         force = item.brace * (stroke - rod)
         speed = item.damper.velocity(force, rod, memory)
         return force, rod, speed, drive, [*item.damper.rates(speed, memory, drive), speed, *driver]
