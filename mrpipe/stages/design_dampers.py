@@ -34,6 +34,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     found = design_dampers(
         rig, settings, load, absolute=simulate.accelerations == "absolute", seed=int(context.rng.integers(2**32))
     )
+    if found.starts.sentence:
+        context.warn(found.starts.sentence)
     summary = design_as_json(rig, found)
     with context.write("design.h5") as artifact:
         artifact.put_json("design", summary)
