@@ -49,11 +49,14 @@ class DampersDesign:
         Calibrated evaluation that scales the objective.
     starts
         The best design from several starts.
+    limits
+        Limits of the design; each holds for every damper.
     """
 
     designed: Designed
     reference: Evaluation
     starts: OtherStarts
+    limits: Limits
 
 
 def design_dampers(
@@ -62,7 +65,7 @@ def design_dampers(
     """Search factors on the tuned gains of all dampers together.
 
     The objective is that of a single law: the weighted largest responses over band, amplitudes and motions, relative to
-    those at the calibrated gains. Stroke, force and drive are those of the damper with the largest RMS displacement.
+    those at the calibrated gains. Stroke, force and drive are each that of the damper where it is largest.
 
     Parameters
     ----------
@@ -107,7 +110,7 @@ def design_dampers(
     # the accurate curves decide; the search used coarse ones
     best = min(best, calibrated, key=lambda item: item.value)
     starts = other_starts(run_of(TOGETHER, best.gains), best, final)
-    return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference, starts)
+    return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference, starts, objective.limits)
 
 
 def _search(value: Callable[[FloatArray], float], count: int, evaluations: int) -> None:
@@ -126,7 +129,7 @@ def _runs(rig: DampersRig, seed: int) -> RunOf:
         dampers = rig.loop_dampers(factors)
 
         def run(excitation: Excitation) -> Response:
-            return rig.run(excitation, dampers, rng=np.random.default_rng(seed)).largest_stroke
+            return rig.run(excitation, dampers, rng=np.random.default_rng(seed)).together
 
         return run
 
@@ -150,6 +153,7 @@ def design_as_json(rig: DampersRig, found: DampersDesign) -> dict[str, Any]:
         "best": _evaluation(best),
         "calibrated": _evaluation(calibrated),
         "improvement": 1.0 - best.value / calibrated.value,
+        "exceeds_limits": {name: value for name, value in found.limits.excess(best.peaks).items() if value > 0.0},
         "evaluations": len(found.designed.tried),
         "starts": starts_as_json(found.starts),
         "curves": {

@@ -51,6 +51,22 @@ def test_eigenvalue_with_a_brace_solves_the_dynamic_stiffness(brace: float) -> N
     assert singular[-1] < 1e-9 * singular[0]
 
 
+@pytest.mark.oracle
+def test_a_dashpot_behind_its_brace_moves_less_than_both_together() -> None:
+    """The rod y of k_b (w'x - y) = c y' as a further unknown of the harmonic equations."""
+    omega, c, brace = 9.0, 400.0, 2.0e4
+    devices = [LinearDevice(FIRST, 200.0), LinearDevice(BETWEEN, c, brace_n_m=brace)]
+    floors, strokes = ground_response(FRAME, devices, omega)
+    equations = np.zeros((5, 5), dtype=complex)
+    equations[:4, :4] = FRAME.stiffness + 1j * omega * FRAME.damping - omega**2 * FRAME.mass
+    equations[:4, :4] += 200.0j * omega * np.outer(FIRST, FIRST) + brace * np.outer(BETWEEN, BETWEEN)
+    equations[:4, 4], equations[4, :4], equations[4, 4] = -brace * BETWEEN, -brace * BETWEEN, brace + 1j * omega * c
+    found = np.linalg.solve(equations, np.append(-FRAME.mass @ np.ones(4), 0.0))
+    np.testing.assert_allclose(floors, found[:4], rtol=1e-9)
+    np.testing.assert_allclose(strokes, [FIRST @ found[:4], found[4]], rtol=1e-9)
+    assert abs(strokes[1]) < 0.99 * abs(BETWEEN @ floors)
+
+
 @pytest.mark.property
 def test_a_damper_alone_has_the_gains_of_the_calibration_of_one_damper() -> None:
     placed = calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "vdns")], CalibrationOptions())

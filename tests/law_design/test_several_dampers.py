@@ -85,7 +85,15 @@ def test_the_json_gives_factors_and_gains(seen: list[Gains]) -> None:
     assert off["factor"] == 1.0 and off["gains"] == {}
     assert shown["improvement"] == pytest.approx(1.0 - shown["best"]["objective"])
     assert shown["evaluations"] == len(seen) - 2
+    assert shown["exceeds_limits"] == {}
     assert shown["starts"] == {"frequency_rad_s": 6.0, "rms_x_top_m": [1.0, 1.05], "differ": True}
+
+
+def test_a_limit_that_no_gain_keeps_is_reported_with_its_excess(seen: list[Gains]) -> None:
+    tight = DesignSettings(weights={"rms_x_top_m": 1.0}, evaluations=3, stroke_limit_m=0.008, force_limit_n=0.02)
+    found = design_dampers(RIG, tight, LOAD, absolute=False, seed=1)  # type: ignore[arg-type]
+    shown = design_as_json(RIG, found)  # type: ignore[arg-type]
+    assert shown["exceeds_limits"] == {"max_stroke_m": pytest.approx(0.25)}
 
 
 def test_without_gains_the_calibration_stays(seen: list[Gains], monkeypatch: pytest.MonkeyPatch) -> None:

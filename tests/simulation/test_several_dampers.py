@@ -23,6 +23,7 @@ from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
+from mrpipe.simulation.windows import QUANTITIES, values_between
 from mrpipe.structures import shear_frame
 from mrpipe.structures.given import device_position
 from mrpipe.structures.response import linear_response
@@ -148,7 +149,23 @@ def test_energy_balance_with_braces_delay_and_noise() -> None:
     found = simulate_dampers(FRAME, dampers, SHAKING, options, rng=np.random.default_rng(1))
     assert found.energy_balance_error < 1e-3
     assert all(item.work_damper[-1] > 0.0 for item in found.dampers.values())
-    assert found.largest_stroke in tuple(found.dampers.values())
+
+
+@pytest.mark.property
+def test_the_largest_values_of_a_run_count_every_damper() -> None:
+    """The lower damper has the larger stroke and drive, the upper one the larger force."""
+    dampers = [
+        LoopDamper("a", FIRST, MODEL.chain(), controller("vd", Gains(c_n_s_m=1500.0)), brace_n_m=1.0e4),
+        LoopDamper("b", SECOND, MODEL.chain(), controller("vd", Gains(c_n_s_m=1500.0))),
+    ]
+    found = simulate_dampers(FRAME, dampers, SHAKING, LoopOptions())
+    edges = np.array([0.0, 2.0, 4.0])
+    own = np.array([values_between(item, edges, False) for item in found.dampers.values()])
+    np.testing.assert_array_equal(values_between(found.together, edges, False), own.max(axis=0))
+    differ = [name for name, column in zip(QUANTITIES, np.moveaxis(own, 2, 0), strict=True) if np.ptp(column, 0).any()]
+    assert differ == ["rms_stroke_m", "rms_drive", "max_stroke_m", "max_force_n"]
+    largest = own[:, 0].argmax(axis=0)
+    assert [largest[QUANTITIES.index(name)] for name in differ] == [0, 0, 0, 1]
 
 
 def regulated(positions: np.ndarray, sensors: Sensors, rate: float = 500.0) -> tuple[list[LoopDamper], object]:
