@@ -92,6 +92,29 @@ def test_gains_together_damp_the_target_mode_more_than_gains_alone() -> None:
 
 
 @pytest.mark.property
+def test_of_two_target_modes_the_one_that_gains_least_over_single_dampers_counts() -> None:
+    low, high = device_position(FRAME, 2, 1), device_position(FRAME, 4, 3)
+    dampers = [PlacedDamper("low", low, "vd"), PlacedDamper("high", high, "vd", mode=2)]
+    found = calibrate_placed(FRAME, dampers, CalibrationOptions())
+    bare = replace(FRAME, damping=np.zeros_like(FRAME.damping))
+    alone = modes_together(bare, found, [1, 2], alone=True).damping_ratios
+
+    def improvement(factors: tuple[float, float]) -> float:
+        devices = [
+            LinearDevice(item.damper.position, factor * item.together.c_n_s_m)
+            for item, factor in zip(found, factors, strict=True)
+        ]
+        ratios = damping_together(bare, devices, [1, 2]).damping_ratios
+        return float(np.min(ratios / alone))
+
+    best = improvement((1.0, 1.0))
+    assert best > 1.01
+    for step in (0.95, 1.05):
+        for factors in ((step, 1.0), (1.0, step), (step, step), (step, 1.0 / step)):
+            assert improvement(factors) <= best + 1e-6
+
+
+@pytest.mark.property
 def test_a_given_gain_stays_and_a_brace_changes_the_best_gain() -> None:
     dampers = [PlacedDamper("base", FIRST, "vd", gains={"c_n_s_m": 321.0}), PlacedDamper("third", BETWEEN, "vd")]
     found = calibrate_placed(FRAME, dampers, CalibrationOptions())
