@@ -30,6 +30,11 @@ TWO = structure(
 )
 
 
+def calibrated(settings: StructureSettings = TWO) -> list[PlacedCalibration]:
+    """Return the calibrated dampers of these settings, computed once."""
+    return _calibrated(settings.model_dump_json())
+
+
 @functools.cache
 def _calibrated(settings: str) -> list[PlacedCalibration]:
     dampers = StructureSettings.model_validate_json(settings).dampers
@@ -38,7 +43,7 @@ def _calibrated(settings: str) -> list[PlacedCalibration]:
 
 def write_artifacts(folder: Path, settings: StructureSettings = TWO) -> dict[str, Artifact]:
     """Write frame.h5 and control.h5 as the stages do and return stage -> artifact."""
-    found = _calibrated(settings.model_dump_json())
+    found = calibrated(settings)
     rows = [damper_as_json(item, AMPLITUDE_M, RESIDUAL_N, 0.01) for item in found]
     weights = [balanced_weights(FRAME, item.damper.position, item.modes, RESIDUAL_N) for item in found]
     together = together_as_json(FRAME, modes_together(FRAME, found, [1, 2]), [1, 2])
