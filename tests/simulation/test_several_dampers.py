@@ -14,6 +14,12 @@ from mrpipe.control.controller import Controller, build_controller
 from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
+from mrpipe.control.kernel import (
+    MEASURED_ACCELERATION,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+)
 from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.control.together import LinearDevice, loop_matrix
 from mrpipe.dampers.model import damper_from_parameter_set
@@ -22,7 +28,7 @@ from mrpipe.signals.discretisation import discretise_first_order
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.simulation.sensors import SensorNoise
-from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, _noise, simulate_dampers
 from mrpipe.simulation.windows import QUANTITIES, values_between
 from mrpipe.structures import shear_frame
 from mrpipe.structures.given import device_position
@@ -166,6 +172,19 @@ def test_the_largest_values_of_a_run_count_every_damper() -> None:
     assert differ == ["rms_stroke_m", "rms_drive", "max_stroke_m", "max_force_n"]
     largest = own[:, 0].argmax(axis=0)
     assert [largest[QUANTITIES.index(name)] for name in differ] == [0, 0, 0, 1]
+
+
+@pytest.mark.property
+def test_dampers_share_the_noise_of_the_accelerometers_and_have_their_own_of_the_displacement() -> None:
+    dampers = [LoopDamper(name, FIRST, None, controller("vd", Gains(c_n_s_m=300.0))) for name in ("a", "b")]
+    options = LoopOptions(noise=SensorNoise(20e-6, 0.1))
+    first, second = _noise(dampers, options, 500, 3, np.random.default_rng(4))
+    np.testing.assert_array_equal(first[:, MEASURED_FLOORS:], second[:, MEASURED_FLOORS:])
+    np.testing.assert_array_equal(first[:, MEASURED_GROUND], second[:, MEASURED_GROUND])
+    for channel, size in ((MEASURED_DISPLACEMENT, 20e-6), (MEASURED_ACCELERATION, 0.1)):
+        both = np.array([first[:, channel], second[:, channel]])
+        assert np.std(both) == pytest.approx(size, rel=0.5)
+        assert abs(np.corrcoef(both)[0, 1]) < 0.2
 
 
 def regulated(positions: np.ndarray, sensors: Sensors, rate: float = 500.0) -> tuple[list[LoopDamper], object]:
