@@ -15,6 +15,8 @@ from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.control.kernel import (
+    COMMAND_DISPLACEMENT,
+    COMMAND_FORCE,
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
@@ -23,6 +25,8 @@ from mrpipe.control.kernel import (
 from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.control.together import LinearDevice, loop_matrix
 from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.dampers.plant import Phase, Step, build_chain
+from mrpipe.effects.inertia import mass_step
 from mrpipe.errors import UserError
 from mrpipe.signals.discretisation import discretise_first_order
 from mrpipe.simulation.excitation import recorded
@@ -142,7 +146,24 @@ def test_a_brace_is_a_spring_in_series() -> None:
     scale = np.abs(expected[:, 0]).max()
     np.testing.assert_allclose(found.displacement, expected[:, :3], atol=1e-4 * np.abs(expected[:, :3]).max())
     np.testing.assert_allclose(found.damper_displacement, expected[:, 6], atol=1e-3 * scale)
+    assert found.energy_balance_error < 1e-5
     np.testing.assert_allclose(found.force, brace * (expected[:, 0] - expected[:, 6]), atol=2e-3 * np.ptp(found.force))
+
+
+@pytest.mark.oracle
+def test_masses_in_two_dampers_are_part_of_the_structure() -> None:
+    """A force m w'x'' adds m w w' to the mass; the accelerations of one damper contain the force of the other."""
+    low, high = device_position(FRAME, 2, 1), SECOND
+    passive = build_controller("passive-off", Gains(), ControllerOptions(drive_limit=1.0))
+    dampers, mass = [], FRAME.mass.copy()
+    for name, position, kilograms in (("low", low, 3.0), ("high", high, 5.0)):
+        step = Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([kilograms, 0.0, 0.0]), 1)
+        dampers.append(LoopDamper(name, position, build_chain([step]), passive))
+        mass += kilograms * np.outer(position, position)
+    options = LoopOptions(plant_rate_hz=4000.0, record_rate_hz=50.0)
+    found = simulate_dampers(FRAME, dampers, SHAKING, options).first.displacement
+    expected = linear_response(replace(FRAME, mass=mass), 2.0 * GROUND, INTERVAL).displacement
+    np.testing.assert_allclose(found, expected, atol=2e-5 * np.abs(expected).max())
 
 
 @pytest.mark.property
@@ -185,6 +206,18 @@ def test_dampers_share_the_noise_of_the_accelerometers_and_have_their_own_of_the
         both = np.array([first[:, channel], second[:, channel]])
         assert np.std(both) == pytest.approx(size, rel=0.5)
         assert abs(np.corrcoef(both)[0, 1]) < 0.2
+    perfect = ControllerOptions(velocity="measured")
+    dampers = [
+        LoopDamper(name, place, None, build_controller("vd", Gains(c_n_s_m=c), perfect))
+        for name, place, c in (("a", FIRST, 300.0), ("b", SECOND, 150.0))
+    ]
+    options = LoopOptions(tracking="ideal", record_rate_hz=200.0, noise=SensorNoise(20e-6, 0.1))
+    response = simulate_dampers(FRAME, dampers, SHAKING, options, rng=np.random.default_rng(4)).dampers.values()
+    read = np.array([item.commands[:, COMMAND_DISPLACEMENT] - item.damper_displacement for item in response])
+    assert np.std(read) == pytest.approx(20e-6, rel=0.1) and abs(np.corrcoef(read)[0, 1]) < 0.1
+    # each history of the desired force is that of its own damper
+    for item in response:
+        np.testing.assert_array_equal(item.desired_force, item.commands[:, COMMAND_FORCE])
 
 
 def regulated(positions: np.ndarray, sensors: Sensors, rate: float = 500.0) -> tuple[list[LoopDamper], object]:
