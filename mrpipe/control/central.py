@@ -67,12 +67,21 @@ class CentralRegulator:
 
 
 def central_regulator(
-    frame: Frame, positions: FloatArray, weights: Sequence[Weights], sensors: Sensors, dt: float
+    frame: Frame,
+    positions: FloatArray,
+    weights: Sequence[Weights],
+    sensors: Sensors,
+    dt: float,
+    *,
+    flexibilities: Sequence[float] | None = None,
 ) -> CentralRegulator:
     """Return the sampled LQG regulator of several dampers.
 
     The dampers resist with forces f, so that M x'' + C x' + K x = -W f - M r x_g''. The weights of energy and of the
     top displacement, and the noise, are those of the first damper; each damper has its own weight of the force.
+
+    A damper behind a brace measures the displacement of its rod, w'x - f/k_b. The observer takes the desired force for
+    f, so that its estimate is the better the more closely the damper follows.
 
     Parameters
     ----------
@@ -86,6 +95,8 @@ def central_regulator(
         Sensors that the observer reads.
     dt
         Sampling interval [s].
+    flexibilities
+        1/k_b of the brace of each damper [m/N]; None: rigid braces.
 
     Raises
     ------
@@ -104,13 +115,15 @@ def central_regulator(
     rows = list(sensors.accelerometers)
     C = np.vstack([np.hstack([positions.T[list(sensors.dampers)], np.zeros((len(sensors.dampers), n))]),
                    acceleration_C[rows]])  # fmt: skip
-    D = np.vstack([np.zeros((len(sensors.dampers), 1 + k)), acceleration_D[rows]])
+    by_braces = np.zeros((k, 1 + k))
+    by_braces[:, 1:] = -np.diag(np.zeros(k) if flexibilities is None else flexibilities)
+    D = np.vstack([by_braces[list(sensors.dampers)], acceleration_D[rows]])
     force_noise = np.array([item.force_noise_n for item in weights])
     W = first.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
     W += Bd[:, 1:] @ np.diag(force_noise**2) @ Bd[:, 1:].T
     W[n:, n:] += (MODEL_NOISE_SHARE * first.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
     V = np.diag([first.displacement_noise_m**2] * len(sensors.dampers) + [first.acceleration_noise_m_s2**2] * len(rows))
-    # an accelerometer next to a damper reads the error of its force at once
+    # an accelerometer next to a damper, and a rod behind a brace, show the error of the force at once
     V += np.diag(np.sum((D[:, 1:] * force_noise) ** 2, axis=1))
     try:
         R = np.diag([item.force for item in weights])

@@ -9,10 +9,11 @@ from typing import Any
 
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.control.laws import law_named
+from mrpipe.law_design.confirmation import Confirmation, OtherStarts
 from mrpipe.law_design.kept import Designed
 from mrpipe.law_design.objective import Evaluation, Limits
 from mrpipe.law_design.options import DesignSettings
-from mrpipe.law_design.run import Confirmation, Result
+from mrpipe.law_design.run import Result
 from mrpipe.law_design.uncertainty import test_for
 from mrpipe.simulation.storage import write_curves
 
@@ -105,6 +106,16 @@ def _confirmation_as_json(found: Confirmation) -> dict[str, Any]:
         "same_law_calibrated": point_as_json(found.same_law),
         "improvement_x_top": found.improvement("rms_x_top_m"),
         "improvement_a_top": found.improvement("rms_a_top_m_s2"),
+        "starts": starts_as_json(found.starts),
+    }
+
+
+def starts_as_json(found: OtherStarts) -> dict[str, Any]:
+    """Return the response of the best design from several starts."""
+    return {
+        "frequency_rad_s": found.frequency_rad_s,
+        "rms_x_top_m": found.rms_x_top_m.tolist(),
+        "differ": found.matter,
     }
 
 

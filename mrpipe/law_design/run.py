@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import Progress
 from mrpipe.control.law import Plant
 from mrpipe.errors import UserError
+from mrpipe.law_design.confirmation import Confirmation, confirmed
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective, evaluate
 from mrpipe.law_design.options import DesignSettings
@@ -46,38 +47,12 @@ sufficient to average sensor noise; a response that does not become periodic kee
 SEARCH_RATE = 0.5
 """Plant rate during the search, relative to the settings; it changes peaks by less than 0.5 %."""
 
-CONFIRMING_RATE = 2.0
-"""Plant rate of the confirmation, relative to the settings, with other sensor noise."""
-
 DRAWN_SHARE = 0.9
 """Local maxima of a response curve above this share of the largest are run in every draw: one of them may be the
 largest in a drawn structure."""
 
 APART = 0.04
 """Maxima whose frequencies differ by less than this share count as one."""
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """The best design and calibrated gains, run again at half the step with other sensor noise.
-
-    Attributes
-    ----------
-    design
-        The best design.
-    calibrated
-        The best law at its calibrated gains.
-    same_law
-        The law of the best design at its calibrated gains.
-    """
-
-    design: Evaluation
-    calibrated: Evaluation
-    same_law: Evaluation
-
-    def improvement(self, quantity: str) -> float:
-        """Return the relative reduction of the largest value of a quantity against the best calibrated gains [1]."""
-        return 1.0 - self.design.peaks[quantity] / self.calibrated.peaks[quantity]
 
 
 @dataclass(frozen=True)
@@ -293,7 +268,7 @@ def _run_design(
     every = [*designed.values(), *free.values()]
     front = _front(run_of, every, load, objective, final, jobs)
     progress(0.94, "confirmation")
-    confirmation = _confirmation(run_of, every, load, objective, final, jobs)
+    confirmation = confirmed(run_of, every, load, objective, final, jobs)
     result = Result(designed, free, best, reference, front, ranking, confirmation, left_out, load)
     if identified is None:
         return result
@@ -333,20 +308,6 @@ def _front(
     runner = Parallel(n_jobs=max(1, jobs), backend="threading")
     again = runner(delayed(evaluate)(run_of, item.law, item.gains, load, objective, final) for item in rough)
     return tuple(pareto_front([*accurate, *again]))
-
-
-def _confirmation(
-    run_of: LoopOf, found: Sequence[Designed], load: Load, objective: Objective, final: CurveOptions, jobs: int
-) -> Confirmation:
-    """Run the best design and calibrated gains at half the step with other sensor noise."""
-    chosen = min(found, key=lambda item: item.best.value)
-    calibrated = min((item.calibrated for item in found), key=lambda item: item.value)
-    finer = replace(run_of.at_rate(CONFIRMING_RATE), seed=run_of.seed + 1)
-    wanted = {(item.law, item.gains): item for item in (chosen.best, calibrated, chosen.calibrated)}
-    runner = Parallel(n_jobs=max(1, jobs), backend="threading")
-    again = runner(delayed(evaluate)(finer, law, gains, load, objective, final) for law, gains in wanted)
-    known = dict(zip(wanted, again, strict=True))
-    return Confirmation(*(known[item.law, item.gains] for item in (chosen.best, calibrated, chosen.calibrated)))
 
 
 def _rank(

@@ -11,9 +11,11 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
+from mrpipe.law_design.confirmation import OtherStarts, other_starts
 from mrpipe.law_design.kept import Designed, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.results import starts_as_json
 from mrpipe.law_design.run import accurate_curves
 from mrpipe.law_design.search import FreeGain, simplex_search
 from mrpipe.law_design.study import COARSE, reference_evaluation
@@ -45,10 +47,16 @@ class DampersDesign:
         Best and calibrated evaluation; their gains are factors by the names of the dampers.
     reference
         Calibrated evaluation that scales the objective.
+    starts
+        The best design from several starts.
+    limits
+        Limits of the design; each holds for every damper.
     """
 
     designed: Designed
     reference: Evaluation
+    starts: OtherStarts
+    limits: Limits
 
 
 def design_dampers(
@@ -57,7 +65,7 @@ def design_dampers(
     """Search factors on the tuned gains of all dampers together.
 
     The objective is that of a single law: the weighted largest responses over band, amplitudes and motions, relative to
-    those at the calibrated gains. Stroke, force and drive are those of the damper with the largest RMS displacement.
+    those at the calibrated gains. Stroke, force and drive are each that of the damper where it is largest.
 
     Parameters
     ----------
@@ -101,7 +109,8 @@ def design_dampers(
         best = evaluate(run_of, TOGETHER, found.gains, load, objective, final)
     # the accurate curves decide; the search used coarse ones
     best = min(best, calibrated, key=lambda item: item.value)
-    return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference)
+    starts = other_starts(run_of(TOGETHER, best.gains), best, final)
+    return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference, starts, objective.limits)
 
 
 def _search(value: Callable[[FloatArray], float], count: int, evaluations: int) -> None:
@@ -120,7 +129,7 @@ def _runs(rig: DampersRig, seed: int) -> RunOf:
         dampers = rig.loop_dampers(factors)
 
         def run(excitation: Excitation) -> Response:
-            return rig.run(excitation, dampers, rng=np.random.default_rng(seed)).largest_stroke
+            return rig.run(excitation, dampers, rng=np.random.default_rng(seed)).together
 
         return run
 
@@ -144,7 +153,9 @@ def design_as_json(rig: DampersRig, found: DampersDesign) -> dict[str, Any]:
         "best": _evaluation(best),
         "calibrated": _evaluation(calibrated),
         "improvement": 1.0 - best.value / calibrated.value,
+        "exceeds_limits": {name: value for name, value in found.limits.excess(best.peaks).items() if value > 0.0},
         "evaluations": len(found.designed.tried),
+        "starts": starts_as_json(found.starts),
         "curves": {
             name: {
                 "frequency_rad_s": item.curves[-1].frequency_rad_s.tolist(),

@@ -101,6 +101,8 @@ class Response:
         Wall time of the compiled loop [s].
     floors
         Columns of the degrees of freedom that move with the ground: the first floor to the top. Empty: all columns.
+    others
+        Responses of the other dampers of the same run, where a largest value counts all dampers.
     """
 
     time_s: FloatArray
@@ -123,6 +125,7 @@ class Response:
     command_time_s: FloatArray
     seconds: float
     floors: tuple[int, ...] = ()
+    others: tuple[Response, ...] = ()
 
     @property
     def columns(self) -> list[int]:

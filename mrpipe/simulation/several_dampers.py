@@ -96,9 +96,10 @@ class DampersResponse:
         return replace(self.first, work_damper=self.work_dampers).energy_balance_error
 
     @property
-    def largest_stroke(self) -> Response:
-        """The response of the damper with the largest RMS displacement."""
-        return max(self.dampers.values(), key=lambda item: float(np.mean(item.damper_displacement**2)))
+    def together(self) -> Response:
+        """The response of the first damper with those of all others, for largest values over all dampers."""
+        first, *others = self.dampers.values()
+        return replace(first, others=tuple(others))
 
 
 def simulate_dampers(

@@ -127,16 +127,23 @@ class DampersRig:
     def regulator(self, dampers: Sequence[LoopDamper]) -> CentralRegulator | None:
         """Return the central regulator of the dampers with law lqg; None where there is none.
 
-        The linear dampers of other laws belong to the structure that it controls.
+        The linear dampers of other laws belong to the structure that it controls, with the gains that they have in
+        `dampers`. Behind a brace, such a damper is
+        replaced by the spring and the dashpot that are equal to both at the free frequency of its target mode.
         """
         members = [item for item in self.dampers if item.known.law == CENTRAL_LAW]
         if not members:
             return None
         damping = self.frame.damping.copy()
         stiffness = self.frame.stiffness.copy()
-        for item in self.devices():
-            damping += item.viscosity * np.outer(item.position, item.position)
-            stiffness += item.stiffness * np.outer(item.position, item.position)
+        for item, loop in zip(self.dampers, dampers, strict=True):
+            device = item.device(loop.controller.gains)
+            if device is None or device.equivalent:
+                continue
+            omega = item.known.calibrated.omega_0
+            own = device.dynamic_stiffness(1j * omega)
+            damping += own.imag / omega * np.outer(device.position, device.position)
+            stiffness += own.real * np.outer(device.position, device.position)
         sensors = Sensors(self.accelerometers, tuple(place for place, item in enumerate(members) if item.measured))
         return central_regulator(
             replace(self.frame, damping=damping, stiffness=stiffness),
@@ -144,6 +151,7 @@ class DampersRig:
             [item.known.calibrated.weights for item in members],
             sensors,
             1.0 / dampers[0].controller.options.rate_hz,
+            flexibilities=[1.0 / item.known.brace_n_m for item in members],
         )
 
     def run(

@@ -118,7 +118,13 @@ class Steady:
 
 
 def steady_values(
-    run: Run, amplitude_m_s2: float, omega: float, options: CurveOptions, first_cycles: int = 0
+    run: Run,
+    amplitude_m_s2: float,
+    omega: float,
+    options: CurveOptions,
+    first_cycles: int = 0,
+    *,
+    phase_rad: float = 0.0,
 ) -> Steady:
     """Return the steady RMS values at one frequency.
 
@@ -136,13 +142,17 @@ def steady_values(
         Lengths and tolerance.
     first_cycles
         Length of the first run in cycles; the shortest possible where it is less than that.
+    phase_rad
+        Phase of the base motion at the start [rad].
     """
     window, settling = options.window_cycles, options.settling_cycles
     shortest = settling + 2 * window
     cycles = min(max(first_cycles, shortest), max(options.most_cycles, shortest))
     period = 2.0 * math.pi / omega
     while True:
-        excitation = harmonic(amplitude_m_s2, omega, cycles=cycles, settling_cycles=cycles - window)
+        excitation = harmonic(
+            amplitude_m_s2, omega, cycles=cycles, settling_cycles=cycles - window, phase_rad=phase_rad
+        )
         try:
             response = run(excitation)
         except DivergedError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +22,8 @@ QUANTITIES = (
 )  # fmt: skip
 """The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`.
 
-`rms_` is the RMS value and `max_` the largest absolute value. The stroke is the displacement across the damper. The
+`rms_` is the RMS value and `max_` the largest absolute value. The stroke is the displacement across the damper. Of
+several dampers, stroke, force and drive are each that of the damper where it is largest. The
 drift is the difference of displacement between successive floors, of the storey where it is largest. The base shear is
 the sum of the floors' masses times absolute accelerations. The drive is in the unit of the damper, A or V.
 """
@@ -65,15 +67,22 @@ def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> F
         return np.asarray(np.maximum.reduceat(np.abs(history[start:]), places))
 
     accelerations = response.absolute_acceleration if absolute else response.acceleration
-    x, stroke, shear = response.displacement, response.damper_displacement, response.base_shear
+    x, shear = response.displacement, response.base_shear
+    dampers = (response, *response.others)
+    strokes, forces, drives = zip(
+        *((item.damper_displacement, item.force, item.drive) for item in dampers), strict=True
+    )
     floors = response.columns
     first, top = floors[0], floors[-1]
     drifts = [x[:, first], *(x[:, floor] - x[:, below] for below, floor in pairwise(floors))]
-    histories = (x[:, top], x[:, first], accelerations[:, first], accelerations[:, top], stroke)
-    columns = [rms(history) for history in histories]
-    columns += [np.max([rms(drift) for drift in drifts], axis=0), rms(shear), rms(response.drive)]
-    columns += [largest(history) for history in histories]
-    columns += [np.max([largest(drift) for drift in drifts], axis=0), largest(shear), largest(response.force)]
+
+    def over(size: Callable[[FloatArray], FloatArray], items: Sequence[FloatArray]) -> FloatArray:
+        return np.asarray(np.max([size(item) for item in items], axis=0))
+
+    histories = (x[:, top], x[:, first], accelerations[:, first], accelerations[:, top])
+    columns = [*map(rms, histories), over(rms, strokes), over(rms, drifts), rms(shear), over(rms, drives)]
+    columns += [*map(largest, histories), over(largest, strokes), over(largest, drifts), largest(shear)]
+    columns.append(over(largest, forces))
     return np.column_stack(columns)
 
 

@@ -20,6 +20,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import time
 
     from mrpipe.control.calibration import CalibrationOptions, plant_of
+    from mrpipe.law_design.confirmation import doubts
     from mrpipe.law_design.kept import Kept
     from mrpipe.law_design.results import design_as_json, write_design
     from mrpipe.law_design.run import load_of, run_design
@@ -55,6 +56,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     for law, why in result.left_out.items():
         context.warn(f"law {law} is not in the race, because {why}")
+    for line in doubts(result.confirmation, plant):
+        context.warn(line)
     summary = {**design_as_json(result, settings), "drive_unit": rig.damper.drive_unit}
     with context.write("design.h5") as artifact:
         write_design(artifact, result, summary)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.loop_inputs import variant_for_dampers
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
@@ -34,7 +35,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     found = design_dampers(
         rig, settings, load, absolute=simulate.accelerations == "absolute", seed=int(context.rng.integers(2**32))
     )
+    if found.starts.sentence:
+        context.warn(found.starts.sentence)
     summary = design_as_json(rig, found)
+    for name, excess in summary["exceeds_limits"].items():
+        context.warn(f"no design keeps all limits: the best one exceeds that of {name} by {in_percent(excess, 1)}")
     with context.write("design.h5") as artifact:
         artifact.put_json("design", summary)
     report.describe_design(context.report, summary)

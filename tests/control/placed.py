@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.control.calibration import CalibrationOptions, balanced_weights
-from mrpipe.control.placed import calibrate_placed, modes_together
+from mrpipe.control.lqg import Weights
+from mrpipe.control.placed import PlacedCalibration, calibrate_placed, modes_together
 from mrpipe.control.placed_storage import damper_as_json, placed_dampers, together_as_json, write_placed
+from mrpipe.control.together import TogetherDamping
 from mrpipe.structures import shear_frame, write_frame
 from mrpipe.structures.options import StructureSettings
 
@@ -29,12 +32,24 @@ TWO = structure(
 )
 
 
+def calibrated(settings: StructureSettings = TWO) -> list[PlacedCalibration]:
+    """Return the calibrated dampers of these settings, computed once."""
+    return _computed(settings.model_dump_json())[0]
+
+
+@functools.cache
+def _computed(settings: str) -> tuple[list[PlacedCalibration], list[Weights], TogetherDamping]:
+    dampers = StructureSettings.model_validate_json(settings).dampers
+    found = calibrate_placed(FRAME, placed_dampers(FRAME, dampers, 1), CalibrationOptions())
+    weights = [balanced_weights(FRAME, item.damper.position, item.modes, RESIDUAL_N) for item in found]
+    return found, weights, modes_together(FRAME, found, [1, 2])
+
+
 def write_artifacts(folder: Path, settings: StructureSettings = TWO) -> dict[str, Artifact]:
     """Write frame.h5 and control.h5 as the stages do and return stage -> artifact."""
-    found = calibrate_placed(FRAME, placed_dampers(FRAME, settings.dampers, 1), CalibrationOptions())
+    found, weights, damping = _computed(settings.model_dump_json())
     rows = [damper_as_json(item, AMPLITUDE_M, RESIDUAL_N, 0.01) for item in found]
-    weights = [balanced_weights(FRAME, item.damper.position, item.modes, RESIDUAL_N) for item in found]
-    together = together_as_json(FRAME, modes_together(FRAME, found, [1, 2]), [1, 2])
+    together = together_as_json(FRAME, damping, [1, 2])
     with ArtifactWriter.create(folder / "frame.h5", Provenance("identify-frame")) as artifact:
         write_frame(artifact, FRAME)
     with ArtifactWriter.create(folder / "control.h5", Provenance("calibrate")) as artifact:

@@ -48,6 +48,28 @@ def motion(rate, seconds, noise=None, omega=8.0, amplitude=0.009):
     return t, x, a, amplitude * omega * np.cos(omega * t)
 
 
+@pytest.mark.oracle
+def test_the_inverse_table_is_zero_below_the_force_without_drive_and_the_limit_above_the_largest():
+    """f = F(u) + c0(u) v of set C, (2.1) to (2.3): between both forces the drive gives the desired one."""
+    speed = np.linspace(0.01, 0.45, 60)
+    for c, expected in ((20.0, "none"), (5000.0, "limit"), (400.0, "between")):
+        options = ControllerOptions(velocity="measured", low_pass_hz=None, drive_limit=4.0)
+        controller = build_controller("vd", Gains(c_n_s_m=c), options, inverse=SET_C)
+        found = run(controller, np.zeros(60), np.zeros(60), speed)
+        drive, force = found[:, COMMAND_INVERSE], found[:, COMMAND_FORCE]
+        np.testing.assert_allclose(force, c * speed)
+        yielded = np.polyval([-1.785, 20.03, 5.03, 19.92], drive) * np.sqrt(3000.0 / 2460.0)
+        reached = yielded + (50.0 + 75.0 * drive) * speed
+        if expected == "none":
+            assert np.all(drive == 0.0) and np.all(reached > force)
+        else:
+            inside = (drive > 0.0) & (drive < 4.0)
+            np.testing.assert_allclose(reached[inside], force[inside], rtol=1e-3)
+            assert np.all(reached[drive == 0.0] >= force[drive == 0.0])
+            assert np.all(reached[drive == 4.0] <= force[drive == 4.0])
+            assert np.any(drive == 4.0) == (expected == "limit") and np.any(inside)
+
+
 @pytest.mark.literature
 def test_velocity_error_of_filter_and_difference():
     rng = np.random.default_rng(2)

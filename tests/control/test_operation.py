@@ -6,21 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from mrpipe.control.calibration import CalibrationOptions, balanced_weights
+from mrpipe.control.calibration import balanced_weights
 from mrpipe.control.calibration_settings import RegulatorSettings
 from mrpipe.control.operation import PlacedOperation, operation_of
-from mrpipe.control.placed import PlacedCalibration, calibrate_placed
-from mrpipe.control.placed_storage import placed_dampers
+from mrpipe.control.placed import PlacedCalibration
 from mrpipe.dampers.model import DamperModel
-from tests.control.placed import AMPLITUDE_M, FRAME, TWO
+from tests.control.placed import AMPLITUDE_M, FRAME, calibrated
 
 pytestmark = pytest.mark.property
 
 FRICTION = {"yield_force_a": 18.0, "yield_force_b": 30.0, "c0_a": 0.0, "yield_displacement": 1e-6, "eta": 80.0}
-
-
-def calibrated() -> PlacedCalibration:
-    return calibrate_placed(FRAME, placed_dampers(FRAME, TWO.dampers, 1), CalibrationOptions())[0]
 
 
 def operation(item: PlacedCalibration, *, wanted_mode: int = 1, drive_limit: float = 2.0) -> PlacedOperation:
@@ -36,7 +31,7 @@ def operation(item: PlacedCalibration, *, wanted_mode: int = 1, drive_limit: flo
 
 
 def test_the_force_without_drive_is_that_at_the_expected_amplitude() -> None:
-    item = calibrated()
+    item = calibrated()[0]
     found = operation(item)
     assert found.summary["expected_amplitude_m"] == AMPLITUDE_M
     assert found.summary["residual_force_n"] == pytest.approx(18.0, rel=1e-3)
@@ -45,13 +40,18 @@ def test_the_force_without_drive_is_that_at_the_expected_amplitude() -> None:
 
 
 def test_a_damper_of_another_mode_gives_a_warning() -> None:
-    item = calibrated()
+    item = calibrated()[0]
     assert not any("does not move" in line for line in operation(item).warnings)
     other = replace(item, damper=replace(item.damper, mode=2))
     assert "low: mode 1 does not move this damper, so that it is calibrated for mode 2" in operation(other).warnings
 
 
 def test_a_damper_that_is_too_weak_gives_a_warning() -> None:
-    strong, weak = operation(calibrated(), drive_limit=100.0), operation(calibrated(), drive_limit=0.0)
+    item = calibrated()[0]
+    strong, weak = operation(item, drive_limit=100.0), operation(item, drive_limit=0.0)
     assert len(weak.warnings) > len(strong.warnings)
     assert all(line.startswith("low: ") for line in weak.warnings)
+    # with the gain for all dampers together, with which it runs
+    needed = item.together.c_n_s_m * item.modes.omega_0 * AMPLITUDE_M
+    assert f"low: vd: needs {needed:.0f} N, but the damper gives at most 18 N" in weak.warnings
+    assert f"{needed:.0f}" != f"{item.alone.c_n_s_m * item.modes.omega_0 * AMPLITUDE_M:.0f}"

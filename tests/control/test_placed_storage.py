@@ -89,6 +89,13 @@ def test_what_was_written_builds_the_same_controllers(tmp_path) -> None:
     assert low.calibrated.weights.force > 0.0
 
 
+def test_the_loop_runs_with_the_gains_for_all_dampers_together(tmp_path) -> None:
+    artifact = write_artifacts(tmp_path)["calibrate"]
+    for item, row, name in zip(read_placed(artifact), artifact.json("dampers"), ("c_n_s_m", "alpha_n_m"), strict=True):
+        assert item.calibrated.gains[item.law][name] == row["gains"][name]
+        assert row["gains"][name] != pytest.approx(row["gains_alone"][name], rel=0.01)
+
+
 def test_no_infinity_reaches_the_json(tmp_path) -> None:
     rows = write_artifacts(tmp_path)["calibrate"].json("dampers")
     json.dumps(rows, allow_nan=False)

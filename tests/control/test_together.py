@@ -51,6 +51,22 @@ def test_eigenvalue_with_a_brace_solves_the_dynamic_stiffness(brace: float) -> N
     assert singular[-1] < 1e-9 * singular[0]
 
 
+@pytest.mark.oracle
+def test_a_dashpot_behind_its_brace_moves_less_than_both_together() -> None:
+    """The rod y of k_b (w'x - y) = c y' as a further unknown of the harmonic equations."""
+    omega, c, brace = 9.0, 400.0, 2.0e4
+    devices = [LinearDevice(FIRST, 200.0), LinearDevice(BETWEEN, c, brace_n_m=brace)]
+    floors, strokes = ground_response(FRAME, devices, omega)
+    equations = np.zeros((5, 5), dtype=complex)
+    equations[:4, :4] = FRAME.stiffness + 1j * omega * FRAME.damping - omega**2 * FRAME.mass
+    equations[:4, :4] += 200.0j * omega * np.outer(FIRST, FIRST) + brace * np.outer(BETWEEN, BETWEEN)
+    equations[:4, 4], equations[4, :4], equations[4, 4] = -brace * BETWEEN, -brace * BETWEEN, brace + 1j * omega * c
+    found = np.linalg.solve(equations, np.append(-FRAME.mass @ np.ones(4), 0.0))
+    np.testing.assert_allclose(floors, found[:4], rtol=1e-9)
+    np.testing.assert_allclose(strokes, [FIRST @ found[:4], found[4]], rtol=1e-9)
+    assert abs(strokes[1]) < 0.99 * abs(BETWEEN @ floors)
+
+
 @pytest.mark.property
 def test_a_damper_alone_has_the_gains_of_the_calibration_of_one_damper() -> None:
     placed = calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "vdns")], CalibrationOptions())
@@ -73,6 +89,29 @@ def test_gains_together_damp_the_target_mode_more_than_gains_alone() -> None:
             moved = list(found)
             moved[place] = replace(found[place], together=law.scaled(found[place].together, factor))
             assert modes_together(bare, moved, [1]).damping_ratios[0] <= together + 1e-7
+
+
+@pytest.mark.property
+def test_of_two_target_modes_the_one_that_gains_least_over_single_dampers_counts() -> None:
+    low, high = device_position(FRAME, 2, 1), device_position(FRAME, 4, 3)
+    dampers = [PlacedDamper("low", low, "vd"), PlacedDamper("high", high, "vd", mode=2)]
+    found = calibrate_placed(FRAME, dampers, CalibrationOptions())
+    bare = replace(FRAME, damping=np.zeros_like(FRAME.damping))
+    alone = modes_together(bare, found, [1, 2], alone=True).damping_ratios
+
+    def improvement(factors: tuple[float, float]) -> float:
+        devices = [
+            LinearDevice(item.damper.position, factor * item.together.c_n_s_m)
+            for item, factor in zip(found, factors, strict=True)
+        ]
+        ratios = damping_together(bare, devices, [1, 2]).damping_ratios
+        return float(np.min(ratios / alone))
+
+    best = improvement((1.0, 1.0))
+    assert best > 1.01
+    for step in (0.95, 1.05):
+        for factors in ((step, 1.0), (1.0, step), (step, step), (step, 1.0 / step)):
+            assert improvement(factors) <= best + 1e-6
 
 
 @pytest.mark.property

@@ -17,7 +17,8 @@ from mrpipe.law_design.run import accurate_curves
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.simulation.steady_state import Run
 from mrpipe.structures import Frame
-from tests.simulation.independent_loop import BoucWen, Device, Sampled, integrate
+from tests.simulation.independent_control import Linear, Sampled
+from tests.simulation.independent_loop import BoucWen, Device, integrate
 
 
 @pytest.mark.oracle
@@ -46,7 +47,7 @@ def test_peak_and_resonance_of_a_law_are_those_of_an_independent_integration() -
 
     def rms(omega: float) -> np.ndarray:
         """Return the RMS displacement of both floors over the last ten of 16 cycles."""
-        devices = [Device(w, damper, Sampled(damper, c, 0.0, 200.0, 4.0, 18.0, 60.0, "kalman"))]
+        devices = [Device(w, damper, Sampled(damper, Linear(c, 0.0), 200.0, 4.0, 18.0, 60.0, "kalman"))]
         period = 2.0 * np.pi / omega
 
         def ground(t: float) -> float:

@@ -11,6 +11,7 @@ import pytest
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
 from mrpipe.law_design import several_dampers
+from mrpipe.law_design.confirmation import OtherStarts
 from mrpipe.law_design.objective import Evaluation, Load, Objective
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.several_dampers import design_as_json, design_dampers
@@ -29,10 +30,16 @@ def _rig(*laws: tuple[str, str, Gains]) -> SimpleNamespace:
     def gains(factors: dict[str, float]) -> list[Gains]:
         return [law_named(item.known.law).scaled(item.gains, factors.get(item.known.name, 1.0)) for item in dampers]
 
-    return SimpleNamespace(dampers=dampers, gains=gains)
+    return SimpleNamespace(dampers=dampers, gains=gains, loop_dampers=gains)
 
 
 RIG = _rig(("below", "vd", Gains(400.0)), ("above", "fdns", Gains(alpha_n_m=900.0)), ("off", "passive-off", Gains()))
+
+
+@pytest.fixture(autouse=True)
+def starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = OtherStarts(6.0, np.array([1.0, 1.05]), 0.0)
+    monkeypatch.setattr(several_dampers, "other_starts", lambda run, best, options: found)
 
 
 @pytest.fixture
@@ -78,6 +85,15 @@ def test_the_json_gives_factors_and_gains(seen: list[Gains]) -> None:
     assert off["factor"] == 1.0 and off["gains"] == {}
     assert shown["improvement"] == pytest.approx(1.0 - shown["best"]["objective"])
     assert shown["evaluations"] == len(seen) - 2
+    assert shown["exceeds_limits"] == {}
+    assert shown["starts"] == {"frequency_rad_s": 6.0, "rms_x_top_m": [1.0, 1.05], "differ": True}
+
+
+def test_a_limit_that_no_gain_keeps_is_reported_with_its_excess(seen: list[Gains]) -> None:
+    tight = DesignSettings(weights={"rms_x_top_m": 1.0}, evaluations=3, stroke_limit_m=0.008, force_limit_n=0.02)
+    found = design_dampers(RIG, tight, LOAD, absolute=False, seed=1)  # type: ignore[arg-type]
+    shown = design_as_json(RIG, found)  # type: ignore[arg-type]
+    assert shown["exceeds_limits"] == {"max_stroke_m": pytest.approx(0.25)}
 
 
 def test_without_gains_the_calibration_stays(seen: list[Gains], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+
+from .independent_control import Central, Perfect, Requested, Sampled
 
 Polynomial = tuple[float, ...]
 """Coefficients of a polynomial of the drive, constant first."""
@@ -59,86 +60,42 @@ class BoucWen:
         return value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta)) + value(self.c0, drive) * speed
 
 
-def kalman_gains(displacement_noise: float, acceleration_noise: float, dt: float) -> np.ndarray:
-    """Return the steady gains of the kinematic filter, by repeating its covariance equations until they settle."""
-    A, G = np.array([[1.0, dt], [0.0, 1.0]]), np.array([0.5 * dt**2, dt])
-    Q = acceleration_noise**2 * np.outer(G, G)
-    P, gains = Q.copy(), np.zeros(2)
-    for _ in range(20000):
-        before = gains
-        gains = P[:, 0] / (P[0, 0] + displacement_noise**2)
-        P = A @ (P - np.outer(gains, P[0])) @ A.T + Q
-        if np.abs(gains - before).max() < 1e-14 * np.abs(gains).max():
-            break
-    return gains
+@dataclass(frozen=True)
+class ModifiedBoucWen:
+    """Paper P4 (1) to (5): f = c1 y' + k1 (x - x0), (c0 + c1) y' = alpha z + c0 x' + k0 (x - y), u' = eta (I - u).
 
-
-@dataclass
-class Sampled:
-    """A controller of Figure 5.3: velocity, force, inverse, switch P2 (24), low-pass, limits.
-
-    The force is c v + k x, clipped by P2 (22). The inverse is the drive at which the damper, after yield, has the
-    desired force at the estimated speed.
+    Its memory is y, z and the voltage u at the damper. The numbers are those of Table 1 of the paper.
     """
 
-    damper: BoucWen
-    c: float
-    k: float
-    rate: float
-    limit: float
-    switch: float
-    low_pass_hz: float | None
-    velocity: str
-    noise: tuple[float, float] = (20e-6, 0.1)
-    estimate: tuple[float, float] | None = None
-    last: tuple[float, float] = (0.0, 0.0)
-    asked: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    given: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    alpha: Polynomial = (46.2e3, 41.2e3)
+    c0: Polynomial = (110.0e3, 114.3e3)
+    c1: Polynomial = (8359.2e3, 7482.9e3)
+    k0: float = 2.0
+    k1: float = 9.7
+    x0: float = 0.18
+    A: float = 1107.2
+    gamma: float = 164.0
+    beta: float = 164.0
+    eta: float = 100.0
+    states: int = 3
 
-    def __post_init__(self) -> None:
-        self.gains = kalman_gains(*self.noise, 1.0 / self.rate)
+    def start(self, drive: float) -> list[float]:
+        return [0.0, 0.0, drive]
 
-    def command(self, x: float, a: float) -> tuple[float, float]:
-        """Return the drive and the desired force, from displacement [m] and acceleration [m/s^2] of the damper."""
-        position, speed = self.moved(x, a)
-        force = self.c * speed + self.k * position
-        if force * speed < 0.0:
-            force = 0.0
-        drive = 0.0 if abs(force) < self.switch else self.inverse(abs(speed), abs(force))
-        return min(max(self.filtered(drive), 0.0), self.limit), force
+    def answer(self, x: float, v: float, memory: np.ndarray, drive: float) -> tuple[float, list[float]]:
+        """Return the force [N] and the rates of the memory."""
+        y, z, u = memory
+        c0, c1 = value(self.c0, u), value(self.c1, u)
+        rate = (value(self.alpha, u) * z + c0 * v + self.k0 * (x - y)) / (c0 + c1)
+        w = v - rate
+        hysteresis = self.A * w - self.gamma * abs(w) * z * abs(z) - self.beta * w * z * z
+        return c1 * rate + self.k1 * (x - self.x0), [rate, hysteresis, self.eta * (drive - u)]
 
-    def moved(self, x: float, a: float) -> tuple[float, float]:
-        dt = 1.0 / self.rate
-        if self.estimate is None:
-            self.estimate = (x, 0.0)
-        elif self.velocity == "difference":
-            self.estimate = (x, (x - self.last[0]) / dt)
-        else:
-            mean = 0.5 * (a + self.last[1])
-            ahead = self.estimate[0] + dt * self.estimate[1] + 0.5 * dt**2 * mean
-            error = x - ahead
-            self.estimate = (ahead + self.gains[0] * error, self.estimate[1] + dt * mean + self.gains[1] * error)
-        self.last = (x, a)
-        return self.estimate
-
-    def inverse(self, speed: float, force: float) -> float:
-        if self.damper.yielded(speed, 0.0) >= force:
-            return 0.0
-        if self.damper.yielded(speed, self.limit) <= force:
-            return self.limit
-        return float(brentq(lambda u: self.damper.yielded(speed, u) - force, 0.0, self.limit, xtol=1e-13))
-
-    def filtered(self, drive: float) -> float:
-        """Butterworth low-pass of second order by the bilinear transform, with the frequency of the cut-off exact."""
-        if self.low_pass_hz is None:
-            return drive
-        w = math.tan(math.pi * self.low_pass_hz / self.rate)
-        scale = 1.0 + math.sqrt(2.0) * w + w * w
-        total = w * w * (drive + 2.0 * self.asked[0] + self.asked[1])
-        total -= 2.0 * (w * w - 1.0) * self.given[0] + (1.0 - math.sqrt(2.0) * w + w * w) * self.given[1]
-        result = total / scale
-        self.asked, self.given = [drive, self.asked[0]], [result, self.given[0]]
-        return result
+    def yielded(self, speed: float, drive: float) -> float:
+        """Return the force at constant speed and drive, after yield [N]; c1 alone gives way to a slow motion."""
+        c0, c1 = value(self.c0, drive), value(self.c1, drive)
+        plastic = value(self.alpha, drive) * math.sqrt(self.A / (self.gamma + self.beta))
+        return min(c1 * speed, c1 * (plastic + c0 * speed) / (c0 + c1))
 
 
 @dataclass
@@ -146,7 +103,7 @@ class Device:
     """A damper between two places of the structure, with its controller; `brace` [N/m] is in series with the damper."""
 
     w: np.ndarray
-    damper: BoucWen
+    damper: BoucWen | ModifiedBoucWen | Perfect
     controller: Sampled
     brace: float = math.inf
 
@@ -210,6 +167,7 @@ class Loop:
             force, rates = item.damper.answer(stroke, speed, memory, drive)
             return force, stroke, speed, drive, [*rates, *driver]
         rod = own[item.damper.states]
+        assert isinstance(item.damper, BoucWen), "this damper has no brace here"
         force = item.brace * (stroke - rod)
         speed = item.damper.velocity(force, rod, memory)
         return force, rod, speed, drive, [*item.damper.rates(speed, memory, drive), speed, *driver]
@@ -226,6 +184,10 @@ class Loop:
         pull = self.W.T @ [part[0] for part in parts]
         acceleration = self.inverse @ (-self.C @ v - self.K @ y[: self.n] - pull) - self.ground(t)
         return np.concatenate([v, acceleration, *(part[4] for part in parts)])
+
+    def floor_accelerations(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return the absolute acceleration of each floor."""
+        return np.asarray(self.slope(t, y)[self.n : 2 * self.n] + self.ground(t))
 
     def rod_accelerations(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the acceleration of each rod; behind a brace it is the change of its speed along the solution."""
@@ -248,12 +210,18 @@ def integrate(
     *,
     delay: float = 0.0,
     driver_s: float = 0.0,
+    central: Central | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-11,
 ) -> Histories:
-    """Integrate the loop from rest; a command acts `delay` after its sample, and the first one acts before, too."""
+    """Integrate the loop from rest; a command acts `delay` after its sample, and the first drive acts before, too.
+
+    `central` is the regulator of the dampers with the law `Requested`.
+    """
     loop = Loop(M, C, K, devices, ground, driver_s)
     rate = devices[0].controller.rate
+    regulated = [d for d, item in enumerate(devices) if isinstance(item.controller.law, Requested)]
+    desired = np.zeros(len(devices))
     samples = round(duration * rate) + 1
     rows: list[tuple[np.ndarray, ...]] = []
     y = loop.start()
@@ -265,13 +233,19 @@ def integrate(
 
     for sample in range(samples):
         t = sample / rate
-        across = loop.rod_accelerations(t, y)
+        across, parts = loop.rod_accelerations(t, y), loop.parts(y)
+        if central is not None:
+            readings = [*(parts[d][1] for d in regulated), *loop.floor_accelerations(t, y)[central.floors]]
+            wanted = central.forces(ground(t), np.array(readings), desired[regulated])
+            for d, force in zip(regulated, wanted, strict=True):
+                devices[d].controller.law = Requested(float(force))
         answers = [
-            item.controller.command(part[1], a) for item, part, a in zip(devices, loop.parts(y), across, strict=True)
+            item.controller.command(part[1], part[2], a) for item, part, a in zip(devices, parts, across, strict=True)
         ]
         commands, desired = (np.array(column) for column in zip(*answers, strict=True))
         if sample == 0:
-            loop.held[:] = commands
+            # a perfect damper has no force before
+            loop.held[:] = [drive * (item.damper.states > 0) for item, drive in zip(devices, commands, strict=True)]
             y = loop.start()
         forces, strokes, _, drives, _ = zip(*loop.parts(y), strict=True)
         rows.append((y[: loop.n], np.array(forces), np.array(drives), commands, desired, np.array(strokes)))

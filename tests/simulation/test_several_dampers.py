@@ -14,15 +14,26 @@ from mrpipe.control.controller import Controller, build_controller
 from mrpipe.control.controller_options import ControllerOptions
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
+from mrpipe.control.kernel import (
+    COMMAND_DISPLACEMENT,
+    COMMAND_FORCE,
+    MEASURED_ACCELERATION,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+)
 from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.control.together import LinearDevice, loop_matrix
 from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.dampers.plant import Phase, Step, build_chain
+from mrpipe.effects.inertia import mass_step
 from mrpipe.errors import UserError
 from mrpipe.signals.discretisation import discretise_first_order
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.simulation.sensors import SensorNoise
-from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
+from mrpipe.simulation.several_dampers import LoopDamper, _noise, simulate_dampers
+from mrpipe.simulation.windows import QUANTITIES, values_between
 from mrpipe.structures import shear_frame
 from mrpipe.structures.given import device_position
 from mrpipe.structures.response import linear_response
@@ -135,7 +146,24 @@ def test_a_brace_is_a_spring_in_series() -> None:
     scale = np.abs(expected[:, 0]).max()
     np.testing.assert_allclose(found.displacement, expected[:, :3], atol=1e-4 * np.abs(expected[:, :3]).max())
     np.testing.assert_allclose(found.damper_displacement, expected[:, 6], atol=1e-3 * scale)
+    assert found.energy_balance_error < 1e-5
     np.testing.assert_allclose(found.force, brace * (expected[:, 0] - expected[:, 6]), atol=2e-3 * np.ptp(found.force))
+
+
+@pytest.mark.oracle
+def test_masses_in_two_dampers_are_part_of_the_structure() -> None:
+    """A force m w'x'' adds m w w' to the mass; the accelerations of one damper contain the force of the other."""
+    low, high = device_position(FRAME, 2, 1), SECOND
+    passive = build_controller("passive-off", Gains(), ControllerOptions(drive_limit=1.0))
+    dampers, mass = [], FRAME.mass.copy()
+    for name, position, kilograms in (("low", low, 3.0), ("high", high, 5.0)):
+        step = Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([kilograms, 0.0, 0.0]), 1)
+        dampers.append(LoopDamper(name, position, build_chain([step]), passive))
+        mass += kilograms * np.outer(position, position)
+    options = LoopOptions(plant_rate_hz=4000.0, record_rate_hz=50.0)
+    found = simulate_dampers(FRAME, dampers, SHAKING, options).first.displacement
+    expected = linear_response(replace(FRAME, mass=mass), 2.0 * GROUND, INTERVAL).displacement
+    np.testing.assert_allclose(found, expected, atol=2e-5 * np.abs(expected).max())
 
 
 @pytest.mark.property
@@ -148,7 +176,48 @@ def test_energy_balance_with_braces_delay_and_noise() -> None:
     found = simulate_dampers(FRAME, dampers, SHAKING, options, rng=np.random.default_rng(1))
     assert found.energy_balance_error < 1e-3
     assert all(item.work_damper[-1] > 0.0 for item in found.dampers.values())
-    assert found.largest_stroke in tuple(found.dampers.values())
+
+
+@pytest.mark.property
+def test_the_largest_values_of_a_run_count_every_damper() -> None:
+    """The lower damper has the larger stroke and drive, the upper one the larger force."""
+    dampers = [
+        LoopDamper("a", FIRST, MODEL.chain(), controller("vd", Gains(c_n_s_m=1500.0)), brace_n_m=1.0e4),
+        LoopDamper("b", SECOND, MODEL.chain(), controller("vd", Gains(c_n_s_m=1500.0))),
+    ]
+    found = simulate_dampers(FRAME, dampers, SHAKING, LoopOptions())
+    edges = np.array([0.0, 2.0, 4.0])
+    own = np.array([values_between(item, edges, False) for item in found.dampers.values()])
+    np.testing.assert_array_equal(values_between(found.together, edges, False), own.max(axis=0))
+    differ = [name for name, column in zip(QUANTITIES, np.moveaxis(own, 2, 0), strict=True) if np.ptp(column, 0).any()]
+    assert differ == ["rms_stroke_m", "rms_drive", "max_stroke_m", "max_force_n"]
+    largest = own[:, 0].argmax(axis=0)
+    assert [largest[QUANTITIES.index(name)] for name in differ] == [0, 0, 0, 1]
+
+
+@pytest.mark.property
+def test_dampers_share_the_noise_of_the_accelerometers_and_have_their_own_of_the_displacement() -> None:
+    dampers = [LoopDamper(name, FIRST, None, controller("vd", Gains(c_n_s_m=300.0))) for name in ("a", "b")]
+    options = LoopOptions(noise=SensorNoise(20e-6, 0.1))
+    first, second = _noise(dampers, options, 500, 3, np.random.default_rng(4))
+    np.testing.assert_array_equal(first[:, MEASURED_FLOORS:], second[:, MEASURED_FLOORS:])
+    np.testing.assert_array_equal(first[:, MEASURED_GROUND], second[:, MEASURED_GROUND])
+    for channel, size in ((MEASURED_DISPLACEMENT, 20e-6), (MEASURED_ACCELERATION, 0.1)):
+        both = np.array([first[:, channel], second[:, channel]])
+        assert np.std(both) == pytest.approx(size, rel=0.5)
+        assert abs(np.corrcoef(both)[0, 1]) < 0.2
+    perfect = ControllerOptions(velocity="measured")
+    dampers = [
+        LoopDamper(name, place, None, build_controller("vd", Gains(c_n_s_m=c), perfect))
+        for name, place, c in (("a", FIRST, 300.0), ("b", SECOND, 150.0))
+    ]
+    options = LoopOptions(tracking="ideal", record_rate_hz=200.0, noise=SensorNoise(20e-6, 0.1))
+    response = simulate_dampers(FRAME, dampers, SHAKING, options, rng=np.random.default_rng(4)).dampers.values()
+    read = np.array([item.commands[:, COMMAND_DISPLACEMENT] - item.damper_displacement for item in response])
+    assert np.std(read) == pytest.approx(20e-6, rel=0.1) and abs(np.corrcoef(read)[0, 1]) < 0.1
+    # each history of the desired force is that of its own damper
+    for item in response:
+        np.testing.assert_array_equal(item.desired_force, item.commands[:, COMMAND_FORCE])
 
 
 def regulated(positions: np.ndarray, sensors: Sensors, rate: float = 500.0) -> tuple[list[LoopDamper], object]:

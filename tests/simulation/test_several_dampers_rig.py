@@ -9,6 +9,7 @@ import pytest
 
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.errors import UserError
+from mrpipe.simulation.resonance import BAND
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
 from mrpipe.simulation.several_dampers_rig import (
     DampersRig,
@@ -21,6 +22,8 @@ from mrpipe.simulation.several_dampers_rig import (
 from mrpipe.structures import natural_modes
 from mrpipe.structures.options import DamperSettings, StructureSettings
 from tests.control.placed import AMPLITUDE_M, FRAME, TWO, structure, write_artifacts
+
+from .independent_control import Central
 
 pytestmark = pytest.mark.property
 
@@ -36,6 +39,7 @@ def test_factors_multiply_the_tuned_gains_of_the_dampers_they_name(tmp_path) -> 
     assert scaled[0].c_n_s_m == pytest.approx(2.0 * plain[0].c_n_s_m)
     assert scaled[1] == plain[1]
     assert [item.name for item in rig.loop_dampers()] == ["low", "damper 2"]
+    assert [item.brace_n_m for item in rig.loop_dampers()] == [4.0e5, np.inf]
     assert len(rig.devices()) == 2 and rig.regulator(rig.loop_dampers()) is None
 
 
@@ -66,6 +70,16 @@ def test_the_band_spans_all_dampers(tmp_path) -> None:
     low, high = dampers_band(rig_of(tmp_path))
     omega = natural_modes(FRAME).angular_frequencies[0]
     assert 0.5 * omega < low < omega < high < 2.0 * omega
+
+
+def test_the_band_of_two_target_modes_contains_both(tmp_path) -> None:
+    # the gains do not matter here, and given ones need no search
+    upper = {"between": (3, 2), "law": "vd", "target_mode": 2, "gains": {"c_n_s_m": 400.0}}
+    both = structure({"between": (1, "ground"), "law": "vd", "gains": {"c_n_s_m": 900.0}}, upper)
+    low, high = dampers_band(rig_of(tmp_path, both))
+    first, second = natural_modes(FRAME).angular_frequencies[:2]
+    assert low == pytest.approx(BAND[0] * first)
+    assert high > second
 
 
 def test_without_a_linear_equivalent_the_amplitude_has_to_be_given(tmp_path) -> None:
@@ -103,3 +117,43 @@ def test_dampers_under_lqg_share_one_regulator(tmp_path) -> None:
     dampers = rig.loop_dampers()
     assert [item.central for item in dampers] == [True, False]
     assert rig.regulator(dampers) is not None
+
+
+@pytest.mark.oracle
+def test_the_regulator_knows_braces_and_the_gains_of_the_other_dampers(tmp_path) -> None:
+    """Its matrices are those of an independent regulator, for the calibrated gains and for the gains of a design."""
+    braced = structure(
+        {"between": (1, "ground"), "name": "low", "gains": {"c_n_s_m": 900.0}, "brace_stiffness_n_m": 3.0e4},
+        {"between": (3, 2), "law": "lqg", "brace_stiffness_n_m": 5.0e4},
+        accelerometers=(1, 3),
+    )
+    rig = rig_of(tmp_path, braced)
+    low, upper = rig.dampers
+    omega, weights = low.known.calibrated.omega_0, upper.known.calibrated.weights
+    for factor in (1.0, 1.7):
+        c = factor * low.gains.c_n_s_m
+        # spring 1/k_b in series with the dashpot c
+        own = 1.0 / (1.0 / 3.0e4 + 1.0 / (1j * omega * c))
+        C, K = FRAME.damping.copy(), FRAME.stiffness.copy()
+        C[0, 0] += own.imag / omega
+        K[0, 0] += own.real
+        expected = Central(
+            FRAME.mass,
+            C,
+            K,
+            np.array([[0.0, -1.0, 1.0]]),
+            0.005,
+            weights=[weights.force],
+            floors=(0, 2),
+            force_noise=[weights.force_noise_n],
+            flexibilities=[2.0e-5],
+        )
+        found = rig.regulator(rig.loop_dampers({"low": factor}))
+        assert found is not None
+        for ours, theirs in (
+            (found.gain, expected.K),
+            (found.transition, expected.Ad - expected.L @ expected.C),
+            (found.force_input, expected.Bd[:, 1:] - expected.L @ expected.D),
+            (found.innovation, np.column_stack([expected.Bd[:, 0], expected.L])),
+        ):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-8 * np.abs(theirs).max())
