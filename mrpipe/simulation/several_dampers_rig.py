@@ -128,8 +128,8 @@ class DampersRig:
         """Return the central regulator of the dampers with law lqg; None where there is none.
 
         The linear dampers of other laws belong to the structure that it controls, with the gains that they have in
-        `dampers`. Behind a brace, such a damper is
-        replaced by the spring and the dashpot that are equal to both at the free frequency of its target mode.
+        `dampers`. Behind a brace, such a damper is replaced by the spring and the dashpot that are equal to both at the
+        free frequency of its target mode.
         """
         members = [item for item in self.dampers if item.known.law == CENTRAL_LAW]
         if not members:

@@ -23,9 +23,9 @@ QUANTITIES = (
 """The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`.
 
 `rms_` is the RMS value and `max_` the largest absolute value. The stroke is the displacement across the damper. Of
-several dampers, stroke, force and drive are each that of the damper where it is largest. The
-drift is the difference of displacement between successive floors, of the storey where it is largest. The base shear is
-the sum of the floors' masses times absolute accelerations. The drive is in the unit of the damper, A or V.
+several dampers, stroke, force and drive are each that of the damper where it is largest. The drift is the difference of
+displacement between successive floors, of the storey where it is largest. The base shear is the sum of the floors'
+masses times absolute accelerations. The drive is in the unit of the damper, A or V.
 """
 
 SMALLEST_GROUP = 3
