@@ -259,8 +259,9 @@ def _check(settings: Any) -> None:
     if section.candidates or section.effect_files:
         effects_named(section.candidates, section.effect_files)
     if section.form_files:
-        declared = [] if section.model == IDENTIFIED else [form_name(section.model)]
-        forms_named([*declared, *section.base_forms], section.form_files)
+        if section.model != IDENTIFIED:
+            forms_named([form_name(section.model)], section.form_files, "close_loop.model")
+        forms_named(section.base_forms, section.form_files, "close_loop.base_forms")
 
 
 STAGE = Stage(
