@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import MrpipeError
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.words import counted
 
 if TYPE_CHECKING:
     from mrpipe.dampers.model import DamperModel
@@ -56,6 +57,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
+    summary["not_tried"] = _not_fitted(traced, [name for name in library if name not in damper_effects()])
+    for name, reason in summary["not_tried"].items():
+        context.warn(f"{name!r} of close_loop.effect_files was not fitted: {reason}")
     _write(context, traced, summary)
     section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
@@ -152,6 +156,20 @@ def _laws(context: StageContext, available: list[str]) -> list[str]:
         if law not in available:
             context.warn(f"law {law} is not compared, because it is not calibrated")
     return laws_to_compare(asked, context.settings.stages, available)
+
+
+def _not_fitted(traced: Tracing, own: Sequence[str]) -> dict[str, str]:
+    """Return name -> reason of the user's effects that the screening left out, so that `candidates` lacks them."""
+    rounds = traced.selection.rounds
+    summary = traced.summary
+    seen = {item.name for candidates in rounds for item in candidates}
+    seen |= {*summary["declared_effects"], *summary["untestable"], *(item["name"] for item in summary["effects"])}
+    fitted = counted(len(rounds[0]), "effect") if rounds else ""
+    reason = (
+        f"by the estimate of the screening it explains less of the residual than the {fitted} that were fitted; "
+        "a larger close_loop.refits fits it too"
+    )
+    return {name: reason for name in own if name not in seen} if rounds else {}
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:

@@ -74,7 +74,9 @@ def trust(facts: RunFacts) -> Section:
             text += f" The named effects recover {percent(recovered)} of what a flexible model recovers of it."
         section.text(text)
         section.table(
-            "rivals", tables.rivals(loop), "Effects that were tried, each alone with all parameters fitted again."
+            "rivals",
+            tables.rivals(loop),
+            "Effects that were fitted after a screening of all, each alone, and all parameters again.",
         )
         section.table("forms", tables.forms(loop), "Base forms that were tried, error on the validation tests.")
     inverse = facts.summary("train-inverse")
