@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import MrpipeError
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.words import counted
 
 if TYPE_CHECKING:
     from mrpipe.dampers.model import DamperModel
@@ -164,10 +163,9 @@ def _not_fitted(traced: Tracing, own: Sequence[str]) -> dict[str, str]:
     summary = traced.summary
     seen = {item.name for candidates in rounds for item in candidates}
     seen |= {*summary["declared_effects"], *summary["untestable"], *(item["name"] for item in summary["effects"])}
-    fitted = counted(len(rounds[0]), "effect") if rounds else ""
     reason = (
-        f"by the estimate of the screening it explains less of the residual than the {fitted} that were fitted; "
-        "a larger close_loop.refits fits it too"
+        "by the estimate of the screening it explains less of the residual than every effect that was fitted; a larger "
+        "close_loop.refits fits it too"
     )
     return {name: reason for name in own if name not in seen} if rounds else {}
 
