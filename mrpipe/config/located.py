@@ -47,9 +47,7 @@ def located(error: UserError, loaded: LoadedConfig) -> UserError:
 
 
 def _keys(setting: str) -> Iterator[str | int]:
-    """Yield the keys of a setting as the lines of a file have them: an index counts from 0, in a message from 1."""
-    for part in setting.split("."):
-        name, *indices = part.rstrip("]").split("[")
-        yield name
-        for index in indices:
-            yield int(index.rstrip("]")) - 1
+    """Yield the keys of a setting up to a colon: `structure`, `dampers` and 0 for `structure.dampers[0]: base`."""
+    for part in setting.partition(":")[0].split("."):
+        yield part.partition("[")[0]
+        yield from map(int, re.findall(r"\[(\d+)\]", part))

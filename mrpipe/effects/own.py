@@ -85,6 +85,6 @@ def require_candidates(names: Sequence[str], known: Collection[str]) -> None:
     UserError
         If there is one; the message names the nearest known effect.
     """
-    for place, name in enumerate(names, start=1):
+    for place, name in enumerate(names):
         if name not in known:
             raise UserError("close_loop", f"candidates[{place}]", f"no effect {name!r}", nearest(name, known))

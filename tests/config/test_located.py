@@ -27,14 +27,14 @@ def path(tmp_path):
 
 
 def test_a_key_of_a_section_is_named_with_its_line(path):
-    error = located(UserError("structure", "degrees_of_freedom[1]", "is called ground", "rename it"), load_config(path))
-    assert str(error) == f"{path}: line 5, structure.degrees_of_freedom[1]: is called ground; rename it"
+    error = located(UserError("structure", "degrees_of_freedom[0]", "is called ground", "rename it"), load_config(path))
+    assert str(error) == f"{path}: line 5, structure.degrees_of_freedom[0]: is called ground; rename it"
 
 
 def test_an_entry_of_a_list_is_named_with_its_own_line(path):
     path.write_text(CONFIG.replace("[ground]", "\n    - deck\n    - ground"))
-    error = located(UserError("structure", "degrees_of_freedom[2]", "is called ground", "rename it"), load_config(path))
-    assert str(error).startswith(f"{path}: line 7, structure.degrees_of_freedom[2]: is called ground")
+    error = located(UserError("structure", "degrees_of_freedom[1]", "is called ground", "rename it"), load_config(path))
+    assert str(error).startswith(f"{path}: line 7, structure.degrees_of_freedom[1]: is called ground")
 
 
 def test_a_file_with_the_name_of_a_section_is_no_setting(path, monkeypatch):

@@ -114,7 +114,7 @@ def test_an_unknown_candidate_is_named_with_its_line(
         "close_loop:\n  candidates:\n    - inertia\n    - heatin\n"
     )
     for more in ([], ["--set", "close_loop.candidates=[heatin]"]):
-        where = f"{config.name}: line 6, close_loop.candidates[2]" if not more else "--set: close_loop.candidates[1]"
+        where = f"{config.name}: line 6, close_loop.candidates[1]" if not more else "--set: close_loop.candidates[0]"
         assert run([command, "--config", str(config), *more]) == 2
         assert f"{where}: no effect 'heatin'; did you mean heating?" in capsys.readouterr().err
     assert sorted(item.name for item in tmp_path.iterdir()) == ["campaign.yaml", "own.yaml"]
