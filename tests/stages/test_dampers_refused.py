@@ -91,3 +91,26 @@ def test_a_described_structure_without_its_matrices_is_not_replaced_by_an_identi
     for command in ("check", "identify-frame"):
         error = _refused(tmp_path, content, command, capsys)
         assert "line 8, structure: describes a structure, but no file, parameter set, storeys or modes; give" in error
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ({"weights": {"rms_x9_m": 1.0}}, "line 4, design.weights.rms_x9_m: is not a quantity; one of rms_x_top_m"),
+        ({"fixed_gains": {"vdd": {}}}, "line 4, design.fixed_gains.vdd: is not a control law; one of vd"),
+        (
+            {"fixed_gains": {"vd": {"k_n_m": 1.0}}},
+            "design.fixed_gains.vd.k_n_m: law vd has no such gain; it has: c_n_s_m",
+        ),
+        ({"band_rad_s": [9.0, 7.0]}, "line 3, design.band_rad_s: is 9 to 7; give a positive rising band"),
+    ],
+)
+@pytest.mark.parametrize("dampers", [[], DAMPERS])
+def test_wrong_settings_of_the_design_are_named_before_anything_is_built(
+    dampers: list[Any], setting: dict[str, Any], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rest = _content(**STOREYS, dampers=dampers)
+    rest |= {"stages": ["design"], "simulate": {"damper": "set-c", "controller": {"inverse": "model"}}}
+    content = {"name": "own", "design": setting, **rest}
+    for command in ("check", "run", "design"):
+        assert said in _refused(tmp_path, content, command, capsys)
