@@ -12,7 +12,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, BoolArray, FloatArray
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import percent
+from mrpipe.reporting.words import percent, quantity
 from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.response import linear_response
 from mrpipe.words import in_percent, listed, number
@@ -299,16 +299,19 @@ def doubts(facts: RunFacts) -> list[str]:
     ]
     if grows:
         found.append(f"The predicted response grows without bound under {listed(grows)}.")
+    # with several dampers a warning begins with the name of the damper
+    run = {*facts.laws, *(item["name"] for item in facts.summary("simulate-dampers").get("dampers") or [])}
     weak = {
-        law: said[1]
+        name: quantity(float(said[1]), "N")
         for line in facts.warnings("calibrate")
-        if (law := line.partition(":")[0]) in facts.laws and (said := _TOO_WEAK.search(line))
+        if (name := line.partition(":")[0]) in run and (said := _TOO_WEAK.search(line))
     }
     if weak:
         need = "needs" if len(weak) == 1 else "need"
         found.append(
             f"{listed(list(weak))} {need} more force than the damper gives at the stroke of the calibration "
-            f"({next(iter(weak.values()))} N): in part of each cycle the force is smaller than the desired one."
+            f"({listed(list(dict.fromkeys(weak.values())))}): in part of each cycle the force is smaller than the desired "
+            "one."
         )
     limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
     if limited:
