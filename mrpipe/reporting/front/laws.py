@@ -310,8 +310,8 @@ def doubts(facts: RunFacts) -> list[str]:
         need = "needs" if len(weak) == 1 else "need"
         found.append(
             f"{listed(list(weak))} {need} more force than the damper gives at the stroke of the calibration "
-            f"({listed(list(dict.fromkeys(weak.values())))}): in part of each cycle the force is smaller than the desired "
-            "one."
+            f"({listed(list(dict.fromkeys(weak.values())))}): in part of each cycle the force is smaller than the "
+            "desired one."
         )
     limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
     if limited:
