@@ -63,20 +63,22 @@ def check_stages(loaded: LoadedConfig) -> None:
     Raises
     ------
     UserError
-        If a stage is unknown or its settings do not fit together.
+        If a stage is unknown or its settings do not fit together; the message names the file and the line.
     """
     from mrpipe.cli.own_effects import refuse_other_rig, without_own_effects
     from mrpipe.cli.session import require_stages
+    from mrpipe.config.located import located
     from mrpipe.pipeline.settings_view import SettingsView
-    from mrpipe.stages.registry import stage_named
 
     require_stages(loaded)
     refuse_other_rig(loaded)
-    config = without_own_effects(loaded)
-    for name in loaded.config.stages:
-        stage = None if name == "report" else stage_named(name)
-        if stage is not None and stage.check is not None:
-            stage.check(SettingsView(config, stage.settings, name))
+    try:
+        config = without_own_effects(loaded)
+        for name, stage in _stages(loaded).items():
+            if name in loaded.config.stages and stage.check is not None:
+                stage.check(SettingsView(config, stage.settings, name))
+    except UserError as error:
+        raise located(error, loaded) from error
 
 
 def measured_campaigns(loaded: LoadedConfig) -> dict[str, Path]:

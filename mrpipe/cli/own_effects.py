@@ -17,10 +17,13 @@ if TYPE_CHECKING:
 def _read(loaded: LoadedConfig) -> dict[Path, FoundEffect]:
     """Return file -> effect of the files that the configuration names."""
     from mrpipe.effects.file_reading import effect_in_file
+    from mrpipe.effects.own import require_free_names
     from mrpipe.pipeline.settings_view import setting_named
 
     files = setting_named(loaded.config, "close_loop.effect_files")
-    return {path: effect_in_file(path) for path in map(Path, files or ())}
+    found = {path: effect_in_file(path) for path in map(Path, files or ())}
+    require_free_names((path, effect.name) for path, effect in found.items())
+    return found
 
 
 def own_effects(loaded: LoadedConfig) -> dict[str, str]:
@@ -31,22 +34,31 @@ def own_effects(loaded: LoadedConfig) -> dict[str, str]:
     Raises
     ------
     UserError
-        If a file is missing, is not Python, or defines no EFFECT.
+        If a file is missing, is not Python, or defines no EFFECT, or if an effect has the name of another one.
     """
     return {found.name: found.kind for found in _read(loaded).values()}
 
 
 def without_own_effects(loaded: LoadedConfig) -> RunSettings:
-    """Return the configuration without effect files, and without candidates that they may define."""
-    from mrpipe.cli.checking import known_effects
+    """Return the configuration without effect files, and without the candidates, which are checked here.
+
+    Raises
+    ------
+    UserError
+        If a candidate is unknown; it may be an effect of the program or of one of the files.
+    """
+    from mrpipe.cli.checking import effects_of_rig
+    from mrpipe.effects.own import require_candidates
 
     own = own_effects(loaded)
     if not own:
         return loaded.config
     section: Any = loaded.config.close_loop  # type: ignore[attr-defined]
-    known = known_effects()
-    candidates = tuple(name for name in section.candidates if name in known or not (name in own or "" in own))
-    changed = section.model_copy(update={"effect_files": (), "candidates": candidates})
+    # a name that the file computes is known only when the file is run
+    if "close-loop" in loaded.config.stages and "" not in own:
+        rig = "shear-frame" if traces_structure(loaded) else "damper-bench"
+        require_candidates(section.candidates, {*effects_of_rig(rig), *own})
+    changed = section.model_copy(update={"effect_files": (), "candidates": ()})
     return loaded.config.model_copy(update={"close_loop": changed})
 
 

@@ -7,6 +7,8 @@ are completed here, where the configuration is known.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from pathlib import Path
 
 from mrpipe.artifacts.yaml_source import read_yaml
 from mrpipe.config.loader import LoadedConfig
@@ -26,19 +28,26 @@ def located(error: UserError, loaded: LoadedConfig) -> UserError:
     loaded
         The configuration. A setting that an option `--set` gave is named with this option.
     """
-    section, *_ = keys = error.source.split(".")
-    if section not in type(loaded.config).model_fields:
+    section, *_ = keys = [*_keys(error.source)]
+    # a file of the user may have the name of a section: `design.py`
+    if section not in type(loaded.config).model_fields or Path(error.source).is_file():
         return error
     is_key = _KEY.fullmatch(error.where) is not None
     if is_key:
-        # an index in a message counts from 1, one of a line from 0, so that the list is looked up as a whole
-        keys = [*keys, *error.where.partition("[")[0].split(".")]
+        keys += _keys(error.where)
     where = f"{error.source}{'.' if is_key else ', ' if error.where else ''}{error.where}"
     given = [override.partition("=")[0].strip() for override in loaded.overrides]
-    if any(".".join(keys[:depth]) in given for depth in range(1, len(keys) + 1)):
+    if any(".".join(map(str, keys[:depth])) in given for depth in range(1, len(keys) + 1)):
         return UserError("--set", where, error.problem, error.remedy)
     lines = read_yaml(loaded.path).lines if loaded.path.is_file() else {}
     known = next((place for depth in range(len(keys), 0, -1) if (place := tuple(keys[:depth])) in lines), None)
     return UserError(
         loaded.path, where if known is None else f"line {lines[known]}, {where}", error.problem, error.remedy
     )
+
+
+def _keys(setting: str) -> Iterator[str | int]:
+    """Yield the keys of a setting up to a colon: `structure`, `dampers` and 0 for `structure.dampers[0]: base`."""
+    for part in setting.partition(":")[0].split("."):
+        yield part.partition("[")[0]
+        yield from map(int, re.findall(r"\[(\d+)\]", part))

@@ -47,22 +47,39 @@ def form_of_file(path: Path | str) -> BaseForm:
     return replace(form, file=str(path))
 
 
-def forms_named(names: Sequence[str], files: Sequence[Path | str] = ()) -> dict[str, BaseForm]:
+def forms_named(
+    names: Sequence[str], files: Sequence[Path | str] = (), setting: str = "identify_damper.form"
+) -> dict[str, BaseForm]:
     """Return the forms of these names (all if none is given), and those of the user's files.
+
+    Parameters
+    ----------
+    names
+        Names of forms.
+    files
+        Files of the user.
+    setting
+        Setting that gives the names, for messages.
 
     Raises
     ------
     UserError
-        If a name is not known.
+        If a name is not known, or the form of a file has the name of another form.
     """
-    known = base_forms()
-    own = {form.name: form for form in map(form_of_file, files)}
+    library = base_forms()
+    own: dict[str, BaseForm] = {}
+    for form in map(form_of_file, files):
+        # the form of the file would otherwise take the place of the other one without a message
+        if form.name in library or form.name in own:
+            other = own[form.name].file if form.name in own else "the program"
+            problem = f"{form.name!r} is already the name of a base form of {other}"
+            raise UserError(form.file, "FORM, name", problem, "give this form another name")
+        own[form.name] = form
+    known = {**library, **own}
     for name in names:
-        if name not in known and name not in own:
-            known_names = {**known, **own}
-            raise UserError("configuration", "base form", f"no base form {name!r}", nearest(name, known_names))
-    chosen = {name: {**known, **own}[name] for name in names} if names else dict(known)
-    return {**chosen, **own}
+        if name not in known:
+            raise UserError(setting, "", f"no base form {name!r}", nearest(name, known))
+    return {**{name: known[name] for name in names or library}, **own}
 
 
 def base_form(name: str, file: str = "") -> BaseForm:

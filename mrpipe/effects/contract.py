@@ -29,6 +29,8 @@ __all__ = [
 ]
 
 Needs = Literal["varying-drive", "varying-speed", "several-frequencies", "several-positions", "long-tests"]
+Quantity = Literal["rod motion", "effective drive", "yield force", "viscous force", "force", "time base"]
+"""Quantity of a damper that an effect modifies."""
 TestKind = Literal[
     "speeds", "steps", "positions", "middle", "frequencies", "amplitudes", "long", "reversal", "constants", "rest"
 ]
@@ -123,8 +125,7 @@ class Effect(Described):
     Attributes
     ----------
     acts_on
-        Quantity that it modifies (`rod motion`, `effective drive`, `yield force`, `viscous force`, `force`, `time
-        base`).
+        Quantity that it modifies.
     forms
         One or several functional shapes.
     needs
@@ -146,7 +147,7 @@ class Effect(Described):
         the command between two samples is not recorded.
     """
 
-    acts_on: str
+    acts_on: Quantity
     forms: tuple[EffectForm, ...]
     needs: tuple[Needs, ...] = ()
     sensor: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from mrpipe.artifacts import Artifact, load_parameter_set
@@ -10,6 +10,7 @@ from mrpipe.dampers.model import Addition, DamperModel, damper_from_parameter_se
 from mrpipe.dampers.model import read_damper as read_plain
 from mrpipe.effects.library import damper_effects, load_effect_file
 from mrpipe.errors import UserError
+from mrpipe.words import listed
 
 DAMPERS_OF_A_RUN = ("identified", "traced")
 """Names of the dampers that the stages of a run build."""
@@ -38,7 +39,7 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
     return read_plain(artifact, group, effect=effect)
 
 
-def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> DamperModel:
+def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]], setting: str = "") -> DamperModel:
     """Return the damper that a setting names.
 
     Parameters
@@ -48,6 +49,8 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
         configs/dampers, or its YAML file.
     artifacts
         Name -> function that opens the artifact of this run that contains the damper.
+    setting
+        Setting that gives the name, for the message.
 
     Raises
     ------
@@ -56,6 +59,8 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
     """
     if name in artifacts:
         return read_damper(artifacts[name]())
+    if setting:
+        require_damper(name, setting, tuple(artifacts))
     if name.endswith(".h5"):
         path = Path(name).absolute()
         if not path.is_file():
@@ -67,22 +72,28 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
     return damper_from_parameter_set(load_parameter_set("dampers", name))
 
 
-def require_damper(name: str) -> None:
-    """Refuse a damper of the option `--damper` that is not there, before stages are built for it.
+def require_damper(name: str, setting: str = "", of_run: Sequence[str] = DAMPERS_OF_A_RUN) -> None:
+    """Refuse a damper that is not there, before stages are built for it.
 
     Parameters
     ----------
     name
-        As in :func:`damper_named`. The dampers of a run are built by its stages.
+        As in :func:`damper_named`.
+    setting
+        Setting that gives the name; empty for the option `--damper`.
+    of_run
+        Names of the dampers that stages of the run build.
 
     Raises
     ------
     UserError
         If there is no such artifact and no such parameter set.
     """
-    if name in DAMPERS_OF_A_RUN:
+    if name in of_run:
         return
     if name.endswith(".h5"):
+        if setting and not Path(name).is_file():
+            raise UserError(setting, "", f"no such artifact {name}", f"name an existing file, or {listed(of_run)}")
         damper_named(name, {})
         return
     try:
@@ -90,5 +101,7 @@ def require_damper(name: str) -> None:
     except UserError as error:
         if "no such parameter set" not in error.problem:
             raise
-        known = f"{', '.join(DAMPERS_OF_A_RUN)}, a file, or one of the {error.remedy}"
+        known = f"{', '.join(of_run)}, a file, or one of the {error.remedy}"
+        if setting:
+            raise UserError(setting, "", f"no such damper {name!r}", known) from None
         raise UserError("--damper", name, "no such damper", known) from None

@@ -8,6 +8,7 @@ from mrpipe.effects import checks as damper_checks
 from mrpipe.effects.checks import Check
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.library import all_effects, effect_of_file
+from mrpipe.effects.own import name_failure, place_failure
 from mrpipe.effects.structural import checks as structural_checks
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.effects.structural.library import all_structural_effects
@@ -24,11 +25,10 @@ def check_file(path: Path) -> tuple[Effect | StructuralEffect, list[Check]]:
     """
     effect = effect_of_file(path, "")
     known = [*all_effects(), *all_structural_effects()]
-    own_name = Check("", "The name is not that of an effect of the program", _taken(getattr(effect, "name", ""), known))
     if isinstance(effect, Effect):
-        return effect, [own_name, *damper_checks.checks_of(effect, known)]
+        return effect, [*_own(effect, "quantity of a damper"), *damper_checks.checks_of(effect, known)]
     if isinstance(effect, StructuralEffect):
-        return effect, [own_name, *structural_checks.checks_of(effect, known)]
+        return effect, [*_own(effect, "place of a structure"), *structural_checks.checks_of(effect, known)]
     raise UserError(
         path,
         "EFFECT",
@@ -37,5 +37,9 @@ def check_file(path: Path) -> tuple[Effect | StructuralEffect, list[Check]]:
     )
 
 
-def _taken(name: str, known: list[str]) -> str:
-    return f"{name} is an effect of the program already" if name in known else ""
+def _own(effect: Effect | StructuralEffect, acts_on: str) -> list[Check]:
+    """Return the demands on an effect of a user that the effects of the program meet by themselves."""
+    return [
+        Check("", "The name is not that of an effect of the program", name_failure(effect.name)),
+        Check("", f"It acts on a known {acts_on}", place_failure(effect)),
+    ]

@@ -11,7 +11,6 @@ from types import ModuleType
 from typing import TypeVar
 
 import mrpipe.effects as package
-from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.dampers.user_file import module_of_file
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.file_reading import REMEDY
@@ -74,8 +73,10 @@ def load_effect_file(path: Path) -> Effect:
     Raises
     ------
     UserError
-        If the file is missing, cannot be run, or defines no EFFECT on a damper.
+        If the file is missing, cannot be run, or defines no EFFECT on a damper, or if its effect has the name of one of
+        the program or acts on an unknown quantity.
     """
+    from mrpipe.effects.own import require_usable
     from mrpipe.effects.structural.contract import StructuralEffect
 
     effect = effect_of_file(path)
@@ -83,6 +84,7 @@ def load_effect_file(path: Path) -> Effect:
         raise UserError(path, "EFFECT", *OF_STRUCTURE)
     if not isinstance(effect, Effect):
         raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
+    require_usable([(path, effect)])
     return effect
 
 
@@ -92,12 +94,13 @@ def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str,
     Raises
     ------
     UserError
-        If a name is not known.
+        If a name is not known, or two effects have the same name.
     """
-    known = damper_effects()
-    own = [load_effect_file(path) for path in files]
-    for name in names:
-        if name not in known:
-            raise UserError("configuration", "close_loop.candidates", f"no effect {name!r}", nearest(name, known))
-    chosen = {name: known[name] for name in names} if names else dict(known)
-    return {**chosen, **{item.name: item for item in own}}
+    from mrpipe.effects.own import require_candidates, require_usable
+
+    loaded = [(path, load_effect_file(path)) for path in files]
+    require_usable(loaded)
+    own = {item.name: item for _, item in loaded}
+    known = {**damper_effects(), **own}
+    require_candidates(names, known)
+    return {**{name: known[name] for name in names or known}, **own}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat, field_validator
 
+from mrpipe.control.laws import known_law
 from mrpipe.options import Section
 
 
@@ -41,7 +42,7 @@ class DesignSettings(Section):
         "its calibrated gains. Quantities: x_top_m, x1_m, drift_m (largest storey drift), stroke_m, a1_m_s2, "
         "a_top_m_s2 and base_shear_n, each with rms_ or max_ in front.",
     )
-    amplitude_factors: tuple[float, ...] = Field(
+    amplitude_factors: tuple[PositiveFloat, ...] = Field(
         (0.75, 1.0),
         min_length=1,
         description="Amplitudes of the base acceleration in multiples of that of `simulate.excitation`.",
@@ -80,3 +81,8 @@ class DesignSettings(Section):
         description="Number of structures and dampers that are drawn from their uncertainty, for the probability of "
         "each law.",
     )
+
+    @field_validator("laws")
+    @classmethod
+    def _laws_are_known(cls, laws: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(known_law(law) for law in laws)

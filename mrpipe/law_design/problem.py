@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.steady_state import Run
+from mrpipe.simulation.windows import QUANTITIES
 
 SMALLEST_SHARE = 0.02
 """If a gain may be zero, the search over logarithms ends at this share of its largest value."""
@@ -83,6 +84,42 @@ def scaled_force(damper: DamperModel, factor: float) -> DamperModel:
     return replace(damper, parameters=parameters, effects=tuple(effects))
 
 
+def require_known(settings: DesignSettings) -> None:
+    """Refuse fixed gains that do not exist, a quantity that is not computed, and an empty band.
+
+    Raises
+    ------
+    UserError
+        If there is one; the message names its setting.
+    """
+    known = all_laws()
+    for name, gains in settings.fixed_gains.items():
+        if name not in known:
+            raise UserError("design.fixed_gains", name, "is not a control law", f"one of {', '.join(known)}")
+        own = known[name].gain_names
+        for gain in gains:
+            if gain not in own:
+                remedy = f"it has: {', '.join(own) or 'none'}"
+                raise UserError(f"design.fixed_gains.{name}", gain, f"law {name} has no such gain", remedy)
+    require_quantities(settings.weights)
+    if settings.band_rad_s is not None:
+        require_band(settings.band_rad_s)
+
+
+def require_quantities(names: Iterable[str]) -> None:
+    """Refuse a quantity that is not computed; the UserError names the setting `design.weights`."""
+    for name in names:
+        if name not in QUANTITIES:
+            raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
+
+
+def require_band(band_rad_s: tuple[float, float]) -> None:
+    """Refuse a band that is not positive and rising; the UserError names the setting of the design."""
+    if not 0.0 < band_rad_s[0] < band_rad_s[1]:
+        problem = f"is {band_rad_s[0]:g} to {band_rad_s[1]:g}"
+        raise UserError("design.band_rad_s", "", problem, "give a positive rising band, the lowest frequency first")
+
+
 def laws_in_the_race(
     settings: DesignSettings, plant: Plant, calibrated: Mapping[str, Gains]
 ) -> tuple[list[LawUnderDesign], list[LawUnderDesign], dict[str, str]]:
@@ -102,10 +139,8 @@ def laws_in_the_race(
     UserError
         If a law or a gain does not exist.
     """
+    require_known(settings)
     known = all_laws()
-    for name in (*settings.laws, *settings.fixed_gains):
-        if name not in known:
-            raise UserError("design.laws", name, "is not a control law", f"one of {', '.join(known)}")
     entries, free_entries, left_out = [], [], {}
     for name in settings.laws or known:
         law = known[name]
@@ -114,11 +149,6 @@ def laws_in_the_race(
             continue
         start = calibrated.get(name, Gains())
         fixed = settings.fixed_gains.get(name, {})
-        for gain in fixed:
-            if gain not in law.gain_names:
-                raise UserError(
-                    f"design.fixed_gains.{name}", gain, "is not a gain of this law", ", ".join(law.gain_names) or "none"
-                )
         free = tuple(_free(gain, plant) for gain in law.gains if gain.name not in fixed)
         entries.append(LawUnderDesign(name, start.changed(**fixed), free, name))
         if fixed and settings.also_free:

@@ -17,7 +17,7 @@ from mrpipe.law_design.confirmation import Confirmation, confirmed
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective, evaluate
 from mrpipe.law_design.options import DesignSettings
-from mrpipe.law_design.problem import LoopOf, laws_in_the_race
+from mrpipe.law_design.problem import LoopOf, laws_in_the_race, require_band, require_quantities
 from mrpipe.law_design.search import SearchOptions
 from mrpipe.law_design.study import COARSE, Loops, design_all, pareto_front, reference_evaluation
 from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
@@ -126,16 +126,8 @@ def load_of(
     UserError
         If the band is empty, a record cannot be read, or a weight is for a quantity that does not exist.
     """
-    for name in settings.weights:
-        if name not in QUANTITIES:
-            raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
-    if not 0.0 < band_rad_s[0] < band_rad_s[1]:
-        raise UserError(
-            "design.band_rad_s",
-            "",
-            f"is {band_rad_s[0]:g} to {band_rad_s[1]:g}",
-            "give a positive rising band, the lowest frequency first",
-        )
+    require_quantities(settings.weights)
+    require_band(band_rad_s)
     motions = []
     for number, item in enumerate(settings.motions):
         setting = f"design.motions[{number}]"

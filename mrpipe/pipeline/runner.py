@@ -10,7 +10,8 @@ from pathlib import Path
 
 from mrpipe.artifacts import atomic_write_text
 from mrpipe.config.loader import LoadedConfig
-from mrpipe.errors import MrpipeError, StageFailed
+from mrpipe.config.located import located
+from mrpipe.errors import MrpipeError, StageFailed, UserError
 from mrpipe.pipeline.code_version import code_version
 from mrpipe.pipeline.execution import MANIFESTS, Order, Outcome, StageRunner, remove_outputs
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
@@ -186,11 +187,15 @@ class Pipeline:
         Raises
         ------
         UserError
-            If it cannot work with them.
+            If it cannot work with them; the message names the file and the line of the setting.
         """
         stage = self.stages[name]
-        if stage.check is not None:
+        if stage.check is None:
+            return
+        try:
             stage.check(SettingsView(self.loaded.config, stage.settings, name))
+        except UserError as error:
+            raise located(error, self.loaded) from error
 
     def _is_to_be_had(self, name: str) -> bool:
         """Return whether an optional input is available: with a given campaign, no other one is recorded."""

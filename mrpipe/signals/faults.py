@@ -59,5 +59,5 @@ def require_known(faults: KnownFaults, names: Sequence[str]) -> None:
     """Check that the campaign has every test for which an offset is given."""
     for name in faults.force_offset_n:
         if name not in names:
-            where = f"prepare.corrections.force_offset_n.{name}"
-            raise UserError("configuration", where, "the campaign has no such test", f"one of {', '.join(names[:8])}")
+            setting = "prepare.corrections.force_offset_n"
+            raise UserError(setting, name, "the campaign has no such test", f"one of {', '.join(names[:8])}")

@@ -146,7 +146,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
         frame = frame_from_parameter_set(settings.frame)
     frame = frame.turned(settings.excitation.direction_deg)
     dampers = {name: partial(artifact, stage) for name, stage in DAMPERS.items()}
-    damper = damper_named(settings.damper, dampers)
+    damper = damper_named(settings.damper, dampers, "simulate.damper")
     controllers = ControllerFactory(
         frame,
         # the controller contains the damper that it was designed for, without effects that the tracing has found since

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.options import Section
@@ -196,7 +196,7 @@ class ResonanceSettings(Section):
         "without damper force to 1.2 times that with a locked damper.",
     )
     points: int = Field(19, ge=5, description="Number of frequencies of the grid; resonances are refined in addition.")
-    amplitude_factors: tuple[float, ...] = Field(
+    amplitude_factors: tuple[PositiveFloat, ...] = Field(
         (1.0,),
         min_length=1,
         description="Amplitudes of the base acceleration in multiples of that of `simulate.excitation`.",

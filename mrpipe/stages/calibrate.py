@@ -33,7 +33,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     frame = read_frame(identified)
     for doubt in doubts_of(identified):
         context.warn(f"the structure of identify-frame may be wrong: {doubt}")
-    damper = damper_named(settings.damper, {"identified": partial(context.artifact, "identify-damper")})
+    damper = damper_named(
+        settings.damper, {"identified": partial(context.artifact, "identify-damper")}, "calibrate.damper"
+    )
     _check_floor(settings.damper_floor, frame)
     place = storey_position if settings.damper_across_storey else floor_position
     position = place(frame.floors, settings.damper_floor)
@@ -120,6 +122,13 @@ def _networks(calibration: Calibration) -> bool:
     return any("network" in law_named(law).needs for law in calibration.laws)
 
 
+def _check(settings: Any) -> None:
+    """Check that the damper is there."""
+    from mrpipe.effects.damper import require_damper
+
+    require_damper(settings.calibrate.damper, "calibrate.damper", ("identified",))
+
+
 STAGE = Stage(
     name="calibrate",
     summary="Compute the limiting frequencies and the gains of every control law.",
@@ -132,4 +141,5 @@ STAGE = Stage(
     ),
     settings=("calibrate",),
     outputs=("control.h5",),
+    check=_check,
 )

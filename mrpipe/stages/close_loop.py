@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
+    summary["not_tried"] = _not_fitted(traced, [name for name in library if name not in damper_effects()])
+    for name, reason in summary["not_tried"].items():
+        context.warn(f"{name!r} of close_loop.effect_files was not fitted: {reason}")
     _write(context, traced, summary)
     section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
@@ -152,6 +155,19 @@ def _laws(context: StageContext, available: list[str]) -> list[str]:
         if law not in available:
             context.warn(f"law {law} is not compared, because it is not calibrated")
     return laws_to_compare(asked, context.settings.stages, available)
+
+
+def _not_fitted(traced: Tracing, own: Sequence[str]) -> dict[str, str]:
+    """Return name -> reason of the user's effects that the screening left out, so that `candidates` lacks them."""
+    rounds = traced.selection.rounds
+    summary = traced.summary
+    seen = {item.name for candidates in rounds for item in candidates}
+    seen |= {*summary["declared_effects"], *summary["untestable"], *(item["name"] for item in summary["effects"])}
+    reason = (
+        "by the estimate of the screening it explains less of the residual than every effect that was fitted; a larger "
+        "close_loop.refits fits it too"
+    )
+    return {name: reason for name in own if name not in seen} if rounds else {}
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
@@ -259,8 +275,9 @@ def _check(settings: Any) -> None:
     if section.candidates or section.effect_files:
         effects_named(section.candidates, section.effect_files)
     if section.form_files:
-        declared = [] if section.model == IDENTIFIED else [form_name(section.model)]
-        forms_named([*declared, *section.base_forms], section.form_files)
+        if section.model != IDENTIFIED:
+            forms_named([form_name(section.model)], section.form_files, "close_loop.model")
+        forms_named(section.base_forms, section.form_files, "close_loop.base_forms")
 
 
 STAGE = Stage(

@@ -68,6 +68,19 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return traced.summary
 
 
+def _check(settings: Any) -> None:
+    """Check that the effects to be considered are known, and that files of the user can be read."""
+    from mrpipe.effects.library import damper_effects
+    from mrpipe.effects.own import require_candidates
+    from mrpipe.effects.structural import library as structural
+
+    section = settings.close_loop
+    if section.candidates or section.effect_files:
+        own, of_damper = structural.effects_of_files(section.effect_files)
+        known = {*structural.all_structural_effects(), *damper_effects(), *(item.name for item in own), *of_damper}
+        require_candidates(section.candidates, known)
+
+
 def _masses_are_known(masses_kg: Sequence[float]) -> bool:
     return bool(masses_kg) and all(math.isfinite(mass) for mass in masses_kg)
 
@@ -91,6 +104,7 @@ def _stage(*inputs: str) -> Stage:
         inputs=inputs,
         settings=("close_loop",),
         outputs=("close-loop.h5", "close-loop.json"),
+        check=_check,
     )
 
 

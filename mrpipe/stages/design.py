@@ -90,6 +90,13 @@ def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, Dam
     return frame, damper
 
 
+def _check(settings: Any) -> None:
+    """Check that laws, gains and quantities of the design are known, and its band."""
+    from mrpipe.law_design.problem import require_known
+
+    require_known(settings.design)
+
+
 STAGE = Stage(
     name="design",
     summary="Find the control law and gains whose largest response over frequency and amplitude is smallest.",
@@ -99,4 +106,5 @@ STAGE = Stage(
     after=("identify-damper", "train-inverse", "simulate", "resonance"),
     settings=("design", "simulate", "resonance", "calibrate.target_mode"),
     outputs=("design.h5",),
+    check=_check,
 )

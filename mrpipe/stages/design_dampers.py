@@ -46,6 +46,13 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return {**summary, "seconds": time.perf_counter() - began}
 
 
+def _check(settings: Any) -> None:
+    """Check that laws, gains and quantities of the design are known, and its band."""
+    from mrpipe.law_design.problem import require_known
+
+    require_known(settings.design)
+
+
 VARIANTS = (
     Stage(
         name="design",
@@ -55,6 +62,7 @@ VARIANTS = (
         after=("simulate",),
         settings=("design", "simulate", "resonance", "structure", "calibrate.damper"),
         outputs=("design.h5",),
+        check=_check,
     ),
 )
 

@@ -59,6 +59,7 @@ def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
     damper = damper_named(
         context.settings.simulate.damper,
         {name: partial(context.artifact, stage) for name, stage in DAMPERS.items()},
+        "simulate.damper",
     )
     chosen = context.settings.simulate.controller
     factory = ControllerFactory(

@@ -37,6 +37,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return summary
 
 
+def _check(settings: Any) -> None:
+    """Check that the section says where the matrices are."""
+    from mrpipe.errors import UserError
+
+    if not settings.structure.given:
+        problem = "describes a structure, but no file, parameter set, storeys or modes"
+        remedy = "give file, frame, storeys, storey_table or mode_shapes, or leave the section out"
+        raise UserError("structure", "", problem, remedy)
+
+
 VARIANTS = (
     Stage(
         name="identify-frame",
@@ -45,12 +55,16 @@ VARIANTS = (
         after=("identify-damper",),
         settings=("structure",),
         outputs=("frame.h5",),
+        check=_check,
     ),
 )
 
 
 def variant(configuration: RunSettings, given: str = "") -> Stage | None:
     """Return the stage if the configuration gives a structure; None if a campaign is to be identified.
+
+    A section that describes matrices without their file has this stage too, which refuses it: a campaign that is
+    identified in its place would not be what the user means.
 
     Parameters
     ----------
@@ -60,6 +74,6 @@ def variant(configuration: RunSettings, given: str = "") -> Stage | None:
         Entry of `campaigns` that the user named on the command line, empty for none.
     """
     structure = getattr(configuration, "structure", None)
-    if structure is None or not structure.given or given == "frame":
+    if structure is None or given == "frame":
         return None
-    return VARIANTS[0]
+    return VARIANTS[0] if structure.given or structure.described else None

@@ -115,6 +115,17 @@ def _write(
             artifact.put_json(name, summary[name])
 
 
+def _check(settings: Any) -> None:
+    """Check that the forms of the user's files can be read, and that the settings name known forms."""
+    from mrpipe.dampers.library import forms_named
+    from mrpipe.fitting.settings import BEST
+
+    section = settings.identify_damper
+    if section.form_files:
+        forms_named(() if section.form == BEST else (section.form,), section.form_files)
+        forms_named(section.compare, section.form_files, "identify_damper.compare")
+
+
 STAGE = Stage(
     name="identify-damper",
     summary="Fit the parametric damper model to the bench tests.",
@@ -123,4 +134,5 @@ STAGE = Stage(
     after=("train-inverse",),
     settings=("identify_damper",),
     outputs=("damper.h5",),
+    check=_check,
 )

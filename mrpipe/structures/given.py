@@ -246,7 +246,7 @@ def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
         twice = next(name for name in names if names.count(name) > 1)
         raise UserError("structure", "degrees_of_freedom", f"{twice} occurs more than once", "give different names")
     for place, name in enumerate(names, start=1):
-        where = f"degrees_of_freedom[{place}]"
+        where = f"degrees_of_freedom[{place - 1}]"
         if name in _GROUND:
             raise UserError("structure", where, f"is called {name}, which means the ground", "choose another name")
         if name.isdigit() and name != str(place):

@@ -195,6 +195,12 @@ class StructureSettings(Section):
         tables = self.storeys or self.storey_table.given or self.mode_shapes
         return bool(self.frame or self.file or tables or self.mass.file or self.stiffness.file)
 
+    @property
+    def described(self) -> bool:
+        """Whether a setting describes the matrices, which has no meaning for a structure that is identified."""
+        keys = ("mass", "stiffness", "damping", "damping_ratio", "degrees_of_freedom", "influence", "influence_y")
+        return any(getattr(self, key) != type(self).model_fields[key].default for key in (*keys, "reduction"))
+
     def in_folder(self, folder: Path) -> StructureSettings:
         """Return the same settings with the paths of all files resolved against a folder."""
 

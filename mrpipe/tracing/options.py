@@ -142,15 +142,16 @@ class TracingSettings(NamingRules):
         False, description="Whether a flexible residual model is added as the effect `unattributed`."
     )
 
-    @field_validator("model")
+    @field_validator("model", "base_forms")
     @classmethod
-    def _model_is_known(cls, value: str, info: ValidationInfo) -> str:
+    def _forms_are_known(cls, value: str | tuple[str, ...], info: ValidationInfo) -> str | tuple[str, ...]:
         # a file of the user may define any name: it is read when the stage is checked
         if info.data.get("form_files"):
             return value
-        known = (*form_names(), "rate-dependent-yield", IDENTIFIED)
-        if value not in known:
-            raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
+        known = (*form_names(), *(("rate-dependent-yield", IDENTIFIED) if isinstance(value, str) else ()))
+        for name in (value,) if isinstance(value, str) else value:
+            if name not in known:
+                raise ValueError(f"no base form {name!r}; {nearest(name, known)}")
         return value
 
 

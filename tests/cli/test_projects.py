@@ -126,6 +126,17 @@ def test_a_campaign_that_a_command_does_not_read_is_refused(project: Path, capsy
 
 
 @pytest.mark.property
+def test_closed_loop_tests_alone_do_not_show_modes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    campaign = _campaign(project / "data")
+    text = CAMPAIGN.replace("damper-bench", "shear-frame").replace("role: training", "kind: closed-loop")
+    (campaign / "campaign.yaml").write_text(text.replace("displacement:", "floor_displacement_1:"), encoding="utf-8")
+    (project / "configs" / "a.yaml").write_text(CONFIG)
+    assert run(["identify-frame", "--campaign", str(campaign)]) == 2
+    said = capsys.readouterr().err
+    assert "holds closed-loop tests; identify-frame reads a campaign of a structure with sweep, random, ambient" in said
+
+
+@pytest.mark.property
 def test_the_bare_name_and_help_explain(capsys: pytest.CaptureFixture[str]) -> None:
     pages = []
     for arguments in ([], ["help"], ["--help"]):

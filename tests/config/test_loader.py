@@ -70,6 +70,9 @@ OVERRIDES = {
     "sweep.strats=3": "--set: sweep.strats: unknown key; did you mean starts?",
     "sweep.neurons=[0]": "--set: sweep.neurons[0]: is 0; a value greater than 0 expected",
     "sweep.layers=[]": "--set: sweep.layers: is []; a list of at least 1 value expected",
+    "design.amplitude_factors=[0]": "--set: design.amplitude_factors[0]: is 0; a value greater than 0 expected",
+    "resonance.amplitude_factors=[0]": "--set: resonance.amplitude_factors[0]: is 0; a value greater than 0 expected",
+    "design.laws=[vdd]": "--set: design.laws: is ['vdd']; no such control law; one of vd,",
     "seed=[1": "--set: seed=[1: value: not valid YAML",
 }
 

@@ -27,8 +27,21 @@ def path(tmp_path):
 
 
 def test_a_key_of_a_section_is_named_with_its_line(path):
+    error = located(UserError("structure", "degrees_of_freedom[0]", "is called ground", "rename it"), load_config(path))
+    assert str(error) == f"{path}: line 5, structure.degrees_of_freedom[0]: is called ground; rename it"
+
+
+def test_an_entry_of_a_list_is_named_with_its_own_line(path):
+    path.write_text(CONFIG.replace("[ground]", "\n    - deck\n    - ground"))
     error = located(UserError("structure", "degrees_of_freedom[1]", "is called ground", "rename it"), load_config(path))
-    assert str(error) == f"{path}: line 5, structure.degrees_of_freedom[1]: is called ground; rename it"
+    assert str(error).startswith(f"{path}: line 7, structure.degrees_of_freedom[1]: is called ground")
+
+
+def test_a_file_with_the_name_of_a_section_is_no_setting(path, monkeypatch):
+    monkeypatch.chdir(path.parent)
+    (path.parent / "structure.py").write_text("")
+    error = UserError("structure.py", "EFFECT", "is missing", "define EFFECT")
+    assert located(error, load_config(path)) is error
 
 
 def test_a_place_that_is_no_key_is_named_after_the_section(path):

@@ -177,7 +177,7 @@ def test_an_unmet_demand_ends_with_status_1_and_a_missing_file_with_2(
     assert run(["check-effect", str(own)]) == 1
     captured = capsys.readouterr()
     assert "FAILED  proportional: No energy is fed in" in captured.out
-    assert "1 of 12 demands are not met" in captured.err
+    assert "1 of 13 demands are not met" in captured.err
     assert run(["check-effect", str(own), "--json"]) == 1
     assert not json.loads(capsys.readouterr().out)["passed"]
     assert run(["check-effect", str(tmp_path / "none.py")]) == 2
@@ -189,7 +189,9 @@ def test_a_file_of_a_structure_and_one_without_effect(tmp_path: Path) -> None:
     own = tmp_path / "own.py"
     own.write_text("from mrpipe.effects.structural.impact import EFFECT\n")
     effect, checks = check_file(own)
-    assert [item.failure for item in checks if not item.passed] == ["impact is an effect of the program already"]
+    assert [item.failure for item in checks if not item.passed] == [
+        "'impact' is already the name of an effect of the program"
+    ]
     assert effect.name == "impact"
     own.write_text("EFFECT = 3\n")
     with pytest.raises(UserError, match="EFFECT: is a int; define EFFECT"):

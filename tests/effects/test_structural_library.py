@@ -45,7 +45,10 @@ def test_an_effect_of_a_structure_and_one_of_a_damper_are_told_apart(tmp_path: P
         "from dataclasses import replace\nfrom mrpipe.effects.structural.impact import EFFECT as I\n"
         "EFFECT = replace(I, name='own-impact')\n"
     )
-    damper.write_text("from mrpipe.effects.remanence import EFFECT\n")
+    damper.write_text(
+        "from dataclasses import replace\nfrom mrpipe.effects.remanence import EFFECT as R\n"
+        "EFFECT = replace(R, name='own-remanence')\n"
+    )
     of_structure, of_damper = effects_of_files([own, damper])
-    assert of_damper == {"remanence": damper}
+    assert of_damper == {"own-remanence": damper}
     assert set(structural_effects((), of_structure)) == {*all_structural_effects(), "own-impact"}

@@ -152,7 +152,7 @@ def test_draws_have_the_deviations_that_are_asked_for(rig: Rig) -> None:
 def test_mistakes_are_named(rig: Rig, plant: Plant) -> None:
     calibrated = rig.controllers.calibrated.gains
     for settings, text in (
-        (DesignSettings(laws=("vdd",)), "vdd"),
+        (DesignSettings(fixed_gains={"vdd": {}}), "vdd"),
         (DesignSettings(fixed_gains={"vd": {"alpha_n_m": 1.0}}), "alpha_n_m"),
     ):
         with pytest.raises(UserError, match=text):

@@ -37,5 +37,5 @@ def test_no_fault_changes_nothing() -> None:
 
 def test_an_offset_of_an_unknown_test_is_refused() -> None:
     require_known(KnownFaults(force_offset_n={"a": 1.0}), ["a", "b"])
-    with pytest.raises(UserError, match=r"force_offset_n\.c: the campaign has no such test; one of a, b"):
+    with pytest.raises(UserError, match=r"force_offset_n: c: the campaign has no such test; one of a, b"):
         require_known(KnownFaults(force_offset_n={"c": 1.0}), ["a", "b"])

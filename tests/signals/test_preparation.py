@@ -392,7 +392,7 @@ def test_a_force_recorded_late_is_brought_in_time() -> None:
 @pytest.mark.property
 def test_an_offset_for_a_test_that_is_not_there_is_refused() -> None:
     options = PreparationOptions(corrections={"force_offset_n": {"two": 1.0}})
-    with pytest.raises(UserError, match=r"force_offset_n\.two: the campaign has no such test; one of one"):
+    with pytest.raises(UserError, match=r"force_offset_n: two: the campaign has no such test; one of one"):
         prepare_campaign(campaign(recording("one")), options)
 
 

@@ -19,6 +19,8 @@ KINDS: dict[str, set[str]] = {
     },
     "random": {"random", "noise", "white", "rauschen", "quake", "earthquake", "northridge", "kobe", "ambient"},
 }
+GUESSED_BY_FORCE = "guessed, because a damper force was recorded"
+"""Reason for the kind of a test whose name states none."""
 MODE = {"mode", "modo", "eigenform", "moda", "m"}
 GAINS: dict[str, tuple[str, ...]] = {
     "vd": ("c_n_s_m",),
@@ -45,7 +47,7 @@ def kind_of(path: Path, channels: dict[str, FloatArray], rate: float) -> tuple[s
     if law_of(path):
         return "closed-loop", ""
     if "damper_force" in channels:
-        return "closed-loop", "guessed, because a damper force was recorded"
+        return "closed-loop", GUESSED_BY_FORCE
     floors = [values for name, values in channels.items() if name.startswith("floor_")]
     if not floors:
         return "random", "guessed"

@@ -6,19 +6,17 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from mrpipe import units
-from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.checks import drive_varies
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.files import all_readers, ending_of
 from mrpipe.campaigns.proposal.columns import (
     Column,
     Guess,
-    Layout,
     floor_columns,
     lay_out_bench,
     lay_out_frame,
@@ -26,13 +24,13 @@ from mrpipe.campaigns.proposal.columns import (
     separator_of,
     share_units,
 )
+from mrpipe.campaigns.proposal.found import FoundFile, ProposedTests, shared_channels
+from mrpipe.campaigns.proposal.frame_tests import frame_tests
 from mrpipe.campaigns.proposal.groups import groups_taken, same_length, tests_in_file
-from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, kind_of_record, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
     Condition,
     condition_of,
     drive_in_name,
-    propose_frame_roles,
     propose_roles,
 )
 from mrpipe.campaigns.proposal.text import TestText, campaign_text
@@ -74,28 +72,6 @@ class Proposal:
     drive_varies: bool = True
 
 
-@dataclass(frozen=True)
-class _File:
-    path: Path
-    file: DataFile
-    columns: list[Column]
-    layout: Layout
-    group: str = ""
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate as far as it is known [Hz], else 1000."""
-        time = self.layout.channels.get("time")
-        if time is not None:
-            steps = np.diff(self.samples(time.column)) * units.conversion(time.unit)
-            return float(1.0 / max(float(np.median(steps)), 1e-9))
-        return self.file.sampling_rate_hz or 1000.0
-
-    def samples(self, column: str) -> FloatArray:
-        """Return a column's samples, shape (n,)."""
-        return next(item.values for item in self.columns if item.name == column)
-
-
 def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) -> list[Proposal]:
     """Propose one campaign for each rig whose tests a folder holds.
 
@@ -116,7 +92,7 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
         If the folder holds no readable data file, or none that fits the requested rig.
     """
     paths, skipped = _data_files(folder), []
-    files: list[_File] = []
+    files: list[FoundFile] = []
     for path in paths:
         try:
             file, columns = open_columns(path)
@@ -149,17 +125,17 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     return proposals
 
 
-def _tests_of(path: Path, file: DataFile, columns: list[Column], rig: Rig | None) -> list[_File]:
+def _tests_of(path: Path, file: DataFile, columns: list[Column], rig: Rig | None) -> list[FoundFile]:
     """Return the tests of a file: one, or several of a bench where groups of columns are tests."""
     groups = tests_in_file(columns, separator_of(file))
     of_a_frame = bool(file.accelerations) or max(floor_columns(members) for _, members in groups) >= 2
     if rig == "frame" or (rig != "bench" and of_a_frame):
         members = same_length(columns)
-        return [_File(path, file, members, lay_out_frame(members, file))]
+        return [FoundFile(path, file, members, lay_out_frame(members, file))]
     tests = []
     for group, members in groups:
         own = file.with_clock_of(item.name for item in members)
-        tests.append(_File(path, own, members, lay_out_bench(members, own), group))
+        tests.append(FoundFile(path, own, members, lay_out_bench(members, own), group))
     return tests
 
 
@@ -170,9 +146,9 @@ def _data_files(folder: Path) -> list[Path]:
 
 
 def _propose(
-    files: list[_File], folder: Path, name: str, bench: bool, beside: Path, skipped: Sequence[str]
+    files: list[FoundFile], folder: Path, name: str, bench: bool, beside: Path, skipped: Sequence[str]
 ) -> Proposal:
-    shared = _shared(files)
+    shared = shared_channels(files)
     unsure = [f"channel {key}: {guess.unsure}" for key, guess in shared.items() if guess.unsure]
     if bench:
         unsure += [
@@ -181,13 +157,13 @@ def _propose(
             if not any(key in item.layout.channels for item in files)
         ]
         unsure += [
-            f"test {_test_name(item, folder)}: no {key} found in {item.path.name}; write its column and unit"
+            f"test {item.test_name(folder)}: no {key} found in {item.path.name}; write its column and unit"
             for key in ("displacement", "force")
             for item in files
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
     unsure += _not_used(files)
-    found_tests = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
+    found_tests = _bench_tests(files, folder, shared) if bench else frame_tests(files, folder, shared)
     tests, doubt = found_tests.tests, found_tests.doubt
     unsure += [*_guessed_in_tests(tests), *found_tests.notes, *([f"roles: {doubt}"] if doubt else [])]
     unused = sorted({column for item in files for column in item.layout.unused})
@@ -219,7 +195,7 @@ def _propose(
     return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped), varies)
 
 
-def _not_used(files: list[_File]) -> list[str]:
+def _not_used(files: list[FoundFile]) -> list[str]:
     """Return a line for each column that names a channel and cannot be read; files with the same column share it."""
     found: dict[str, list[str]] = {}
     for path in dict.fromkeys(item.path for item in files):
@@ -232,33 +208,6 @@ def _not_used(files: list[_File]) -> list[str]:
         + (f" (and in {counted(len(lines) - 1, 'other file')})" if lines[1:] else "")
         for column, lines in found.items()
     ]
-
-
-def _shared(files: list[_File]) -> dict[str, Guess]:
-    """Return the channels of the campaign: those of all files, each with the guess that most files share.
-
-    A channel that some files lack belongs to the tests that have it, because the reader would look for its column in
-    every file.
-    """
-    names = list(dict.fromkeys(key for item in files for key in item.layout.channels))
-    shared = {}
-    for key in names:
-        if any(key not in item.layout.channels for item in files):
-            continue
-        guesses = [item.layout.channels[key] for item in files if key in item.layout.channels]
-        shared[key] = max(
-            guesses, key=lambda guess: sum((g.column, g.unit) == (guess.column, guess.unit) for g in guesses)
-        )
-    return shared
-
-
-def _own(item: _File, shared: dict[str, Guess]) -> dict[str, Guess]:
-    """Return the channels of a file that differ from those of the campaign."""
-    return {
-        key: guess
-        for key, guess in item.layout.channels.items()
-        if key not in shared or (guess.column, guess.unit) != (shared[key].column, shared[key].unit)
-    }
 
 
 def _guessed_in_tests(tests: Sequence[TestText]) -> list[str]:
@@ -274,26 +223,11 @@ def _guessed_in_tests(tests: Sequence[TestText]) -> list[str]:
     ]
 
 
-def _test_name(item: _File, folder: Path) -> str:
-    relative = item.path.relative_to(folder)
-    parts = [*relative.parent.parts, relative.name[: -len(ending_of(item.path))], *item.group.split("/")]
-    return "-".join(filter(None, parts)).replace(" ", "_").strip(".") or "test"
-
-
-class _Tests(NamedTuple):
-    """Proposed tests, the source of their roles or kinds, open questions, and what is unsure about the roles."""
-
-    tests: list[TestText]
-    why: str
-    notes: list[str]
-    doubt: str
-
-
-def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> _Tests:
+def _bench_tests(files: list[FoundFile], folder: Path, shared: dict[str, Guess]) -> ProposedTests:
     notes = groups_taken([(item.path.name, item.group) for item in files])
     tests, conditions, without = [], [], []
     for item in files:
-        own = _own(item, shared)
+        own = item.own(shared)
         drive = item.layout.channels.get("drive")
         if drive is None:
             stated = drive_in_name(item.group) or drive_in_name(item.path.stem)
@@ -302,11 +236,9 @@ def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
                 "", unit, "" if stated else "no drive in the file or its name: 0 A is a placeholder", value=value
             )
             if not stated:
-                without.append(_test_name(item, folder))
+                without.append(item.test_name(folder))
         conditions.append(_condition(item, own))
-        tests.append(
-            TestText(name=_test_name(item, folder), file=item.path.relative_to(folder).as_posix(), channels=own)
-        )
+        tests.append(TestText(name=item.test_name(folder), file=item.path.relative_to(folder).as_posix(), channels=own))
     if without:
         notes.append(
             f"drive: neither a column nor the name of the file gives it in {counted(len(without), 'test')} "
@@ -324,13 +256,15 @@ def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
             replace(tests[0], name=f"{tests[0].name}-1", role="training", segments=((float(first), middle),)),
             replace(tests[0], name=f"{tests[0].name}-2", role="validation", segments=((middle, float(last)),)),
         ]
-        return _Tests(tests, found.why, notes, "one file only, so training and validation are parts of one record")
+        return ProposedTests(
+            tests, found.why, notes, "one file only, so training and validation are parts of one record"
+        )
     tests = [replace(test, role=role) for test, role in zip(tests, found.roles, strict=True)]
     certain = "repeated" in found.why or "names" in found.why
-    return _Tests(tests, found.why, notes, "" if certain else found.why)
+    return ProposedTests(tests, found.why, notes, "" if certain else found.why)
 
 
-def _drive_varies(files: list[_File], tests: Sequence[TestText]) -> bool:
+def _drive_varies(files: list[FoundFile], tests: Sequence[TestText]) -> bool:
     drives = []
     for item, test in zip(files, tests, strict=False):
         if test.role == "training":
@@ -340,7 +274,7 @@ def _drive_varies(files: list[_File], tests: Sequence[TestText]) -> bool:
     return not drives or drive_varies(drives)
 
 
-def _condition(item: _File, own: dict[str, Guess]) -> Condition:
+def _condition(item: FoundFile, own: dict[str, Guess]) -> Condition:
     displacement = item.layout.channels.get("displacement")
     values = item.samples(displacement.column) if displacement else np.zeros(100)
     size = units.conversion(displacement.unit) if displacement else 1.0
@@ -351,49 +285,3 @@ def _condition(item: _File, own: dict[str, Guess]) -> Condition:
         stated = own["drive"]
         levels = np.full(values.size, (stated.value or 0.0) * units.conversion(stated.unit))
     return condition_of(np.nan_to_num(values) * size, np.nan_to_num(levels), item.rate)
-
-
-def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> _Tests:
-    tests, notes = [], []
-    kinds = [
-        kind_of_record(_samples_of(item))
-        if item.file.accelerations
-        else kind_of(item.path, _samples_of(item), item.rate)
-        for item in files
-    ]
-    roles = propose_frame_roles([item.path for item in files], [kind for kind, _ in kinds])
-    for item, (kind, doubt), role in zip(files, kinds, roles, strict=True):
-        name = _test_name(item, folder)
-        if doubt:
-            notes.append(f"test {name}: kind {kind}, {doubt}")
-        law = law_of(item.path) if kind == "closed-loop" else ""
-        missing = ""
-        if kind == "closed-loop" and not law:
-            missing = "the control law is not known; write law: vd, or another one"
-        elif law and GAINS[law]:
-            gains = ", ".join(f"{gain}: ..." for gain in GAINS[law])
-            missing = f"the gains of law {law} are not known; write gains: {{{gains}}}"
-        if missing:
-            notes.append(f"test {name}: {missing}")
-        tests.append(
-            TestText(
-                name=name,
-                file=item.path.relative_to(folder).as_posix(),
-                channels=_own(item, shared),
-                role="validation" if role == "validation" else "",
-                kind=kind,
-                law=law,
-                mode=mode_of(item.path) if kind == "free-decay" else None,
-                doubt="; ".join(text for text in (doubt, missing) if text),
-            )
-        )
-    notes.append("frame: floor_masses_kg is not known; write the masses where they are known")
-    unvalidated = "no test repeats another, so none validates; close-loop needs a test with role validation"
-    why = "kinds from the names of the files where they state them"
-    return _Tests(tests, why, notes, "" if "validation" in roles else unvalidated)
-
-
-def _samples_of(item: _File) -> dict[str, FloatArray]:
-    """Return channel -> samples of a file, NaN replaced by zero."""
-    guesses = item.layout.channels.items()
-    return {key: np.nan_to_num(item.samples(guess.column)) for key, guess in guesses if guess.column}

@@ -42,8 +42,12 @@ def effects_of_files(files: Sequence[Path]) -> tuple[list[StructuralEffect], dic
     Raises
     ------
     UserError
-        If a file is missing, cannot be run, or defines no EFFECT.
+        If a file is missing, cannot be run, or defines no EFFECT, or if an effect has the name of another one or acts
+        on an unknown place.
     """
+    from mrpipe.effects.own import require_usable
+
+    loaded: list[tuple[Path, Effect | StructuralEffect]] = []
     of_structure: list[StructuralEffect] = []
     of_damper: dict[str, Path] = {}
     for path in files:
@@ -55,11 +59,14 @@ def effects_of_files(files: Sequence[Path]) -> tuple[list[StructuralEffect], dic
         else:
             remedy = "define EFFECT = StructuralEffect(...) as mrpipe/effects/structural/*.py do"
             raise UserError(path, "EFFECT", "is missing", remedy)
+        loaded.append((path, effect))
+    require_usable(loaded)
     return of_structure, of_damper
 
 
 def structural_effects(names: Sequence[str] = (), own: Sequence[StructuralEffect] = ()) -> dict[str, StructuralEffect]:
     """Return the effects of these names (all if none of them is one of a structure), and those of the user."""
-    known = all_structural_effects()
-    chosen = {name: known[name] for name in names if name in known} or dict(known)
-    return {**chosen, **{item.name: item for item in own}}
+    of_user = {item.name: item for item in own}
+    known = {**all_structural_effects(), **of_user}
+    chosen = {name: known[name] for name in names if name in known} or known
+    return {**chosen, **of_user}

@@ -264,7 +264,8 @@ def shapes_on_frame(shapes: FloatArray, frequencies_hz: Sequence[float], damping
         axis.plot([-0.8, 0.8], [0.0, 0.0], color="k", lw=1.2)
         axis.set_xlim(-1.05, 1.05)
         axis.set_axis_off()
-        axis.set_title(f"mode {mode + 1}\n{frequencies_hz[mode]:.3g} Hz\n{percent(damping_ratios[mode])}", fontsize=9)
+        frequency, damping = number(frequencies_hz[mode]), percent(damping_ratios[mode])
+        axis.set_title(f"mode {mode + 1}\n{frequency} Hz\n{damping}", fontsize=9)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +12,15 @@ import numpy as np
 from mrpipe.artifacts import Artifact, BoolArray, FloatArray
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import percent
+from mrpipe.reporting.words import percent, quantity
 from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.response import linear_response
 from mrpipe.words import in_percent, listed, number
 
 UNCONTROLLED = "no damper"
+
+_TOO_WEAK = re.compile(r"the damper gives at most (\d+) N")
+"""Warning of `calibrate` on a law whose force the damper cannot give."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +284,7 @@ def _designed_together(design: Mapping[str, Any]) -> str:
 
 
 def doubts(facts: RunFacts) -> list[str]:
-    """Return what to distrust of the closed loop: extrapolation, and laws limited by the unpowered damper."""
+    """Return what to distrust of the closed loop: extrapolation, and laws that the force of the damper limits."""
     shares = {law: _outside(summary) for law, summary in facts.laws.items()}
     far = sorted(((share, law) for law, share in shares.items() if share > 0.01), reverse=True)
     found = []
@@ -295,6 +299,20 @@ def doubts(facts: RunFacts) -> list[str]:
     ]
     if grows:
         found.append(f"The predicted response grows without bound under {listed(grows)}.")
+    # with several dampers a warning begins with the name of the damper
+    run = {*facts.laws, *(item["name"] for item in facts.summary("simulate-dampers").get("dampers") or [])}
+    weak = {
+        name: quantity(float(said[1]), "N")
+        for line in facts.warnings("calibrate")
+        if (name := line.partition(":")[0]) in run and (said := _TOO_WEAK.search(line))
+    }
+    if weak:
+        need = "needs" if len(weak) == 1 else "need"
+        found.append(
+            f"{listed(list(weak))} {need} more force than the damper gives at the stroke of the calibration "
+            f"({listed(list(dict.fromkeys(weak.values())))}): in part of each cycle the force is smaller than the "
+            "desired one."
+        )
     limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
     if limited:
         found.append(

@@ -21,7 +21,7 @@ from mrpipe.reporting.places import is_chain, names_of
 from mrpipe.reporting.traced_words import notes_on_model, shares_in_words, shown_candidates
 from mrpipe.reporting.words import percent, quantity
 from mrpipe.reporting.writer import Section
-from mrpipe.words import listed, number
+from mrpipe.words import listed, number, shell_word, shortest
 
 _POINTS_OF_A_LOOP = 700
 _POINTS_OF_A_CURVE = 1500
@@ -74,7 +74,9 @@ def trust(facts: RunFacts) -> Section:
             text += f" The named effects recover {percent(recovered)} of what a flexible model recovers of it."
         section.text(text)
         section.table(
-            "rivals", tables.rivals(loop), "Effects that were tried, each alone with all parameters fitted again."
+            "rivals",
+            tables.rivals(loop),
+            "Effects that were fitted after a screening of all, each alone, and all parameters again.",
         )
         section.table("forms", tables.forms(loop), "Base forms that were tried, error on the validation tests.")
     inverse = facts.summary("train-inverse")
@@ -370,9 +372,10 @@ def next_steps(facts: RunFacts) -> Section:
         section.text("On the rig:")
         section.points(remedies)
     if (loop.get("corrections") or {}).get("found"):
+        file = shell_word(shortest(facts.directory / loop["corrections"]["file"]))
         section.text(
-            f"Faults of sensors were found. `mrpipe run --settings {loop['corrections']['file']}` removes them from "
-            "the recordings and repeats the analysis."
+            f"Faults of sensors were found. `mrpipe run --settings {file}`, with the same configuration or campaign, "
+            "removes them from the recordings and repeats the analysis."
         )
     files = [f"`{file}`: {use}" for file, use in _FILES if (facts.directory / file).exists()]
     if files:

@@ -232,6 +232,34 @@ def test_a_folder_with_bench_and_frame_becomes_two_campaigns(tmp_path: Path) -> 
 
 
 @pytest.mark.planted
+def test_bench_tests_that_are_taken_for_tests_of_a_structure_are_doubted(tmp_path: Path) -> None:
+    folder = bench_folder(tmp_path / "damper", 4, samples=400)
+    [proposal] = propose_campaigns(folder, "own", "frame", tmp_path / "p" / "data" / "own")
+    said = [line for line in proposal.unsure if "look like bench tests of a damper" in line]
+    assert len(said) == 1 and said[0].startswith("4 tests (") and "in a new directory with --rig bench" in said[0]
+    # nothing is demanded of tests that are not closed loops
+    assert not any("control law" in line for line in proposal.unsure)
+    marked = [line for line in proposal.text.splitlines() if "UNSURE: looks like a bench test of a damper" in line]
+    assert len(marked) == 4
+
+
+@pytest.mark.planted
+def test_closed_loops_of_a_structure_are_no_bench_tests_and_share_their_question(tmp_path: Path) -> None:
+    folder = tmp_path / "tower"
+    folder.mkdir()
+    rows = [f"{k / 100};{k % 7 - 3};{k % 5 - 2};{k % 3};{k % 4}" for k in range(400)]
+    for name in ("messung_1", "messung_2"):
+        lines = ["Zeit (s);Etage 1 (g);Etage 2 (g);Dämpferkraft (N);Strom (A)", *rows]
+        (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    [proposal] = propose_campaigns(folder, "own", None, tmp_path / "p" / "data" / "own")
+    assert [kind for _, kind in proposal.tests] == ["closed-loop", "closed-loop, validation"]
+    assert not any("bench" in line for line in proposal.unsure)
+    assert [line for line in proposal.unsure if "control law" in line] == [
+        "2 tests (messung_1, messung_2): the control law is not known; write law: vd, or another one"
+    ]
+
+
+@pytest.mark.planted
 def test_channels_that_some_files_lack_belong_to_the_tests_that_have_them(tmp_path: Path) -> None:
     folder = frame_folder(tmp_path / "Turm", sweep_s=20.0)
     header, *rows = (folder / "gleitsinus1.csv").read_text(encoding="utf-8").splitlines()

@@ -51,6 +51,16 @@ def test_report_of_a_bench_alone_has_no_empty_sections(tmp_path: Path) -> None:
     assert [section.anchor for section in sections(alone)] == ["result", "trust", "damper", "next"]
 
 
+def test_the_command_that_applies_corrections_names_the_file_with_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    facts = run_in(tmp_path / "runs", tracing(corrections={"found": True, "file": "corrections.yaml"}))
+    texts = [item["text"] for item in sections(facts)[-1].items if item["kind"] == "text"]
+    assert any("`mrpipe run --settings runs/corrections.yaml`, with the same" in text for text in texts)
+
+
 def test_first_screen_in_the_terminal_has_no_marks(tmp_path: Path) -> None:
     lines = first_screen(run_in(tmp_path))
     assert lines[0] == "my-rig"

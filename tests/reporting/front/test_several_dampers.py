@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mrpipe.reporting.facts import ReportStage, RunFacts
-from mrpipe.reporting.front import several_dampers
+from mrpipe.reporting.front import laws, several_dampers
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.headlines import headline
 
@@ -45,6 +46,15 @@ def test_the_report_states_laws_damping_and_forces_of_each_damper(tmp_path: Path
     assert [row["k [kN/m]"] for row in found] == ["-", "2000"] and found[0]["rms force [kN]"] == "76.9"
     control = next(section for section in sections(facts) if section.anchor == "control")
     assert any(item["kind"] == "table" and item["name"] == "dampers" for item in control.items)
+
+
+def test_dampers_that_are_too_weak_for_their_laws_are_named(tmp_path: Path) -> None:
+    facts = facts_of(tmp_path)
+    calibrate, *others = facts.stages
+    said = [f"{name}: vd: needs 1850312 N, but the damper gives at most 1217152 N" for name in ("base", "roof")]
+    facts = RunFacts(tmp_path, "tower", "", [replace(calibrate, warnings=said), *others])
+    found = " ".join(laws.doubts(facts))
+    assert "base and roof need more force than the damper gives at the stroke of the calibration (1.22 MN)" in found
 
 
 def test_the_lines_of_the_appendix_name_the_dampers() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
+from mrpipe.reporting.facts import ReportStage, RunFacts
 from mrpipe.reporting.front import laws
 from mrpipe.reporting.front.statements import statements
 from mrpipe.structures import read_frame, write_frame
@@ -120,6 +121,16 @@ def test_doubts_name_rivals_and_extrapolation(tmp_path: Path) -> None:
     text = answers(tmp_path)["Distrust"]
     assert "do not separate accumulator from end-stop" in text
     assert "extrapolated beyond its bench tests under passive-off (40 % of the time)" in text
+
+
+def test_doubts_name_simulated_laws_that_need_more_force_than_the_damper_gives(tmp_path: Path) -> None:
+    facts = run_in(tmp_path)
+    warnings = [f"{law}: needs 546 N, but the damper gives at most 150 N" for law in ("vd", "nnc")]
+    stages = [*facts.stages, ReportStage("calibrate", "calibrate.", [], {"laws": {}}, warnings, "", 1.0)]
+    found = " ".join(laws.doubts(RunFacts(facts.directory, "", "", stages)))
+    assert "vd needs more force than the damper gives at the stroke of the calibration (150 N): in part" in found
+    assert "nnc" not in found
+    assert "more force" not in " ".join(laws.doubts(facts))
 
 
 def test_a_law_that_was_designed_is_the_answer(tmp_path: Path) -> None:
