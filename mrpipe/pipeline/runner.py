@@ -190,10 +190,9 @@ class Pipeline:
             If it cannot work with them; the message names the file and the line of the setting.
         """
         stage = self.stages[name]
-        if stage.check is None:
-            return
         try:
-            stage.check(SettingsView(self.loaded.config, stage.settings, name))
+            if stage.check is not None:
+                stage.check(SettingsView(self.loaded.config, stage.settings, name))
         except UserError as error:
             raise located(error, self.loaded) from error
 
