@@ -18,7 +18,6 @@ from mrpipe.control.laws import all_laws, law_named, law_names
 from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
-from mrpipe.words import in_percent
 
 Source = Literal["exact", "closed-form", "published"]
 
@@ -322,59 +321,3 @@ def calibrate_law(plant: Plant, law: Law, options: CalibrationOptions) -> LawCal
     gains = gains.changed(**options.overrides.get(law.name, {}))
     law.check(gains)
     return LawCalibration(law.name, gains, candidates, **vars(law.assess(plant, gains)))
-
-
-def validity_warnings(
-    calibration: Calibration,
-    *,
-    amplitude_m: float,
-    residual_force_n: float,
-    largest_force_n: float,
-) -> list[str]:
-    """Return warnings about the calibrated laws, one sentence each.
-
-    Parameters
-    ----------
-    calibration
-        Calibration of all laws.
-    amplitude_m
-        Amplitude of the damper at which the forces are compared [m].
-    residual_force_n, largest_force_n
-        Force of the damper at the peak speed of this amplitude [N], without drive and at the drive limit.
-    """
-    said = []
-    limit = calibration.static_stiffness_n_m
-    omega = calibration.modes.omega_0
-    for law, item in calibration.laws.items():
-        negative = law_named(law).negative_stiffness(item.gains)
-        if negative > limit:
-            said.append(
-                f"{law}: negative stiffness of {-negative:.0f} N/m is beyond the static limit of {-limit:.0f} N/m at "
-                f"the damper; unclipped, its fastest pole is {item.unstable_pole_1_s:+.2f} rad/s"
-            )
-        elif negative > 0.9 * limit:
-            said.append(
-                f"{law}: negative stiffness is at {in_percent(negative / limit)} of the static limit of "
-                f"{-limit:.0f} N/m"
-            )
-        needed = needed_force(law_named(law), item.gains, amplitude_m, omega)
-        if needed <= 0.0:
-            continue
-        if needed > largest_force_n:
-            said.append(f"{law}: needs {needed:.0f} N, but the damper gives at most {largest_force_n:.0f} N")
-        if residual_force_n > 0.3 * needed:
-            said.append(
-                f"{law}: the residual force of {residual_force_n:.0f} N is {in_percent(residual_force_n / needed)} of "
-                f"the {needed:.0f} N needed at {1e3 * amplitude_m:.1f} mm: the residual force limits the law, "
-                "not the largest force"
-            )
-    return said
-
-
-def needed_force(law: Law, gains: Gains, amplitude_m: float, omega: float) -> float:
-    """Return the largest force [N] of a law in harmonic motion; 0 if the law defines no harmonic force."""
-    if law.harmonic_force is None:
-        return 0.0
-    phase = np.linspace(0.0, 2.0 * np.pi, 1441)
-    x, v = amplitude_m * np.sin(phase), amplitude_m * omega * np.cos(phase)
-    return float(np.max(np.abs(law.harmonic_force(gains, x, v, amplitude_m))))

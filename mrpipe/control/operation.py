@@ -10,7 +10,7 @@ from mrpipe.control.calibration import balanced_weights
 from mrpipe.control.calibration_settings import RegulatorSettings
 from mrpipe.control.limits import LimitingModes, placement_warning
 from mrpipe.control.lqg import Weights
-from mrpipe.control.placed import PlacedCalibration, placed_warnings
+from mrpipe.control.placed import PlacedCalibration, placed_validity
 from mrpipe.control.placed_storage import damper_as_json
 from mrpipe.dampers.model import DamperModel
 from mrpipe.structures import Frame
@@ -91,9 +91,10 @@ def operation_of(
         )
     if hardly := placement_warning(frame, item.modes):
         warnings.append(f"{name}: {hardly}")
-    warnings += placed_warnings(item, amplitude_m=amplitude_m, residual_force_n=residual, largest_force_n=largest)
+    demand, doubts = placed_validity(item, amplitude_m=amplitude_m, residual_force_n=residual, largest_force_n=largest)
+    summary = damper_as_json(item, amplitude_m, residual, rounding_share * speed)
     return PlacedOperation(
-        damper_as_json(item, amplitude_m, residual, rounding_share * speed),
+        {**summary, "force_demand": demand and demand.as_json()},
         balanced_weights(frame, item.damper.position, item.modes, residual, **regulator.known()),
-        tuple(warnings),
+        (*warnings, *doubts),
     )

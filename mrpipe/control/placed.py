@@ -17,7 +17,6 @@ from mrpipe.control.calibration import (
     LawCalibration,
     calibrate_law,
     plant_of,
-    validity_warnings,
 )
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
@@ -25,6 +24,7 @@ from mrpipe.control.laws import law_named
 from mrpipe.control.limits import LimitingModes, critical_friction
 from mrpipe.control.lqg import Weights
 from mrpipe.control.together import LinearDevice, TogetherDamping, damping_together, linear_device
+from mrpipe.control.validity import ForceDemand, force_demands, validity_warnings
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
@@ -244,20 +244,24 @@ def _best_factors(ratios: Callable[[FloatArray], FloatArray], reference: FloatAr
     return factors * exact.first_critical(lambda share: float(np.min(ratios(share * factors))), 0.0, 1.0)
 
 
-def placed_warnings(
+def placed_validity(
     item: PlacedCalibration, *, amplitude_m: float, residual_force_n: float, largest_force_n: float
-) -> list[str]:
-    """Return warnings about one damper, one sentence each; arguments as in `validity_warnings`."""
+) -> tuple[ForceDemand | None, list[str]]:
+    """Return the force that the law of a damper needs, and warnings, one sentence each.
+
+    Arguments as in :func:`mrpipe.control.validity.force_demands`. The force is None where the law defines none.
+    """
     if item.law is None:
-        return []
+        return None, []
+    law = item.damper.law
     calibration = Calibration(
         item.modes,
         item.static_stiffness_n_m,
-        {item.damper.law: replace(item.law, gains=item.together)},
+        {law: replace(item.law, gains=item.together)},
         np.zeros(0),
         item.damper.position,
     )
-    lines = validity_warnings(
+    demands = force_demands(
         calibration, amplitude_m=amplitude_m, residual_force_n=residual_force_n, largest_force_n=largest_force_n
     )
-    return [f"{item.damper.name}: {line}" for line in lines]
+    return demands.get(law), [f"{item.damper.name}: {line}" for line in validity_warnings(calibration, demands)]

@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.assembly import expected_amplitude
-    from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
+    from mrpipe.control.calibration import balanced_weights, calibrate
     from mrpipe.control.limits import limiting_modes, placement_warning
     from mrpipe.control.neural import reference_options
     from mrpipe.control.operation import forces_at
     from mrpipe.control.storage import calibration_to_json, write_calibration
+    from mrpipe.control.validity import force_demands, validity_warnings
     from mrpipe.effects.damper import damper_named
     from mrpipe.modal.storage import doubts_of
     from mrpipe.reporting import calibrate as report
@@ -51,9 +52,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for law, reason in calibration.skipped.items():
         context.warn(f"law {law} was skipped: {reason}")
     context.progress(0.3, "laws")
-    for line in validity_warnings(
-        calibration, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest
-    ):
+    demands = force_demands(calibration, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest)
+    for line in validity_warnings(calibration, demands):
         context.warn(line)
     rounding = settings.friction_rounding_share * (amplitude * modes.omega_0)
     reference = None
@@ -70,6 +70,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "expected_amplitude_m": amplitude,
         "residual_force_n": residual,
         "largest_force_n": largest,
+        "force_demands": {law: demand.as_json() for law, demand in demands.items()},
     }
     report.describe(context.report, frame, calibration, summary, amplitude, settings.map_points)
     return summary

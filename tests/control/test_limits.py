@@ -12,9 +12,7 @@ from mrpipe.control.calibration import (
     _force_weight,
     balanced_weights,
     calibrate,
-    needed_force,
     plant_of,
-    validity_warnings,
 )
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
@@ -94,35 +92,6 @@ def test_negative_stiffness_beyond_the_static_limit_folds(bare, thesis_frame, fl
     assert not answer.stable and answer.unstable_pole == pytest.approx(1.29, abs=0.01)
     assert answer.damping_ratio == -1.0
     assert exact.exact_damping(bare, floor_one, modes, 250.0, -4000.0).stable
-    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source="published", published=THESIS_GAINS))
-    said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
-    assert any("vdns" in line and "beyond the static limit of -4123" in line and "+1.29" in line for line in said)
-    near = CalibrationOptions(overrides={"vdns": Gains(250.0, -4000.0)})
-    said = validity_warnings(
-        calibrate(thesis_frame, floor_one, near), amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0
-    )
-    assert any("vdns" in line and "97 %" in line for line in said)
-
-
-@pytest.mark.literature
-def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one):
-    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source="published", published=THESIS_GAINS))
-    assert needed_force(law_named("vd"), Gains(650.0), 0.0093, 8.0) == pytest.approx(48.0, abs=0.5)
-    said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
-    assert any(line.startswith("vd: the residual force of 22 N") for line in said)
-    weak = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=1.0, largest_force_n=40.0)
-    assert any("vd: needs 48 N, but the damper gives at most 40 N" in line for line in weak)
-
-
-@pytest.mark.property
-def test_only_laws_with_negative_stiffness_are_compared_with_the_static_limit(thesis_frame, floor_one):
-    """Friction in proportion to an extremum has none, however strong it is."""
-    laws = [law_named(name) for name in ("fdns", "homogeneous-friction")]
-    options = CalibrationOptions(overrides={law.name: {"alpha_n_m": 5000.0} for law in laws})
-    said = validity_warnings(
-        calibrate(thesis_frame, floor_one, options, laws), amplitude_m=0.01, residual_force_n=1.0, largest_force_n=1e6
-    )
-    assert [line.split(":")[0] for line in said if "static limit" in line] == ["fdns"]
 
 
 @pytest.mark.property

@@ -51,6 +51,7 @@ def test_a_damper_that_is_too_weak_gives_a_warning() -> None:
     strong, weak = operation(item, drive_limit=100.0), operation(item, drive_limit=0.0)
     assert len(weak.warnings) > len(strong.warnings)
     assert all(line.startswith("low: ") for line in weak.warnings)
+    assert weak.summary["force_demand"]["exceeds_damper"] and not strong.summary["force_demand"]["exceeds_damper"]
     # with the gain for all dampers together, with which it runs
     needed = item.together.c_n_s_m * item.modes.omega_0 * AMPLITUDE_M
     assert f"low: vd: needs {needed:.0f} N, but the damper gives at most 18 N" in weak.warnings

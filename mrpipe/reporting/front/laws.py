@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,9 +17,6 @@ from mrpipe.structures.response import linear_response
 from mrpipe.words import in_percent, listed, number
 
 UNCONTROLLED = "no damper"
-
-_TOO_WEAK = re.compile(r"the damper gives at most (\d+) N")
-"""Warning of `calibrate` on a law whose force the damper cannot give."""
 
 
 @dataclass(frozen=True)
@@ -283,6 +279,15 @@ def _designed_together(design: Mapping[str, Any]) -> str:
     )
 
 
+def _force_demands(facts: RunFacts) -> dict[str, Mapping[str, Any]]:
+    """Return law or damper -> forces needed and available; where some were simulated, of these alone."""
+    calibrated = facts.summary("calibrate")
+    dampers = {item["name"]: item.get("force_demand") for item in calibrated.get("dampers") or []}
+    demands = {**calibrated.get("force_demands", {}), **{name: row for name, row in dampers.items() if row}}
+    run = {*facts.laws, *(item["name"] for item in facts.summary("simulate-dampers").get("dampers") or [])}
+    return {name: row for name, row in demands.items() if not run or name in run}
+
+
 def doubts(facts: RunFacts) -> list[str]:
     """Return what to distrust of the closed loop: extrapolation, and laws that the force of the damper limits."""
     shares = {law: _outside(summary) for law, summary in facts.laws.items()}
@@ -299,13 +304,8 @@ def doubts(facts: RunFacts) -> list[str]:
     ]
     if grows:
         found.append(f"The predicted response grows without bound under {listed(grows)}.")
-    # with several dampers a warning begins with the name of the damper
-    run = {*facts.laws, *(item["name"] for item in facts.summary("simulate-dampers").get("dampers") or [])}
-    weak = {
-        name: quantity(float(said[1]), "N")
-        for line in facts.warnings("calibrate")
-        if (name := line.partition(":")[0]) in run and (said := _TOO_WEAK.search(line))
-    }
+    demands = _force_demands(facts)
+    weak = {name: quantity(row["largest_force_n"], "N") for name, row in demands.items() if row["exceeds_damper"]}
     if weak:
         need = "needs" if len(weak) == 1 else "need"
         found.append(
@@ -313,7 +313,7 @@ def doubts(facts: RunFacts) -> list[str]:
             f"({listed(list(dict.fromkeys(weak.values())))}): in part of each cycle the force is smaller than the "
             "desired one."
         )
-    limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
+    limited = [name for name, row in demands.items() if row["limited_by_residual_force"]]
     if limited:
         found.append(
             f"The unpowered damper limits {listed(limited)}: in part of each cycle they request less force than it "

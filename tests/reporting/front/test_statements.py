@@ -125,8 +125,9 @@ def test_doubts_name_rivals_and_extrapolation(tmp_path: Path) -> None:
 
 def test_doubts_name_simulated_laws_that_need_more_force_than_the_damper_gives(tmp_path: Path) -> None:
     facts = run_in(tmp_path)
-    warnings = [f"{law}: needs 546 N, but the damper gives at most 150 N" for law in ("vd", "nnc")]
-    stages = [*facts.stages, ReportStage("calibrate", "calibrate.", [], {"laws": {}}, warnings, "", 1.0)]
+    demand = {"largest_force_n": 150.0, "exceeds_damper": True, "limited_by_residual_force": False}
+    summary = {"laws": {}, "force_demands": dict.fromkeys(("vd", "nnc"), demand)}
+    stages = [*facts.stages, ReportStage("calibrate", "calibrate.", [], summary, [], "", 1.0)]
     found = " ".join(laws.doubts(RunFacts(facts.directory, "", "", stages)))
     assert "vd needs more force than the damper gives at the stroke of the calibration (150 N): in part" in found
     assert "nnc" not in found
