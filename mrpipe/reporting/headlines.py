@@ -25,6 +25,7 @@ def headline(stage: str, summary: Mapping[str, Any]) -> str:
         "identify-damper": _damper,
         "identify-frame": _frame,
         "calibrate": _calibration,
+        "design": _design,
         "close-loop": _close_loop,
     }
     return lines[stage](summary) if stage in lines and summary else _plain(summary)
@@ -97,6 +98,22 @@ def _calibration(summary: Mapping[str, Any]) -> str:
     return (
         f"omega_0 {_number(summary.get('omega_0'), digits=4)} rad/s, "
         f"omega_inf {_number(summary.get('omega_inf'), digits=4)} rad/s, {len(summary.get('laws') or {})} laws"
+    )
+
+
+def _design(summary: Mapping[str, Any]) -> str:
+    best = summary.get("best")
+    if isinstance(best, Mapping):
+        calibrated = summary.get("calibrated") or {}
+        return (
+            f"gains of {listed(list(summary.get('dampers') or {}))} together: largest rms x_top over frequency "
+            f"{_number(best.get('peak_rms_x_top_m'), 1e3)} mm, with the calibrated gains "
+            f"{_number(calibrated.get('peak_rms_x_top_m'), 1e3)} mm"
+        )
+    peaks = {law: item.get("peak_rms_x_top_m") for law, item in (summary.get("laws") or {}).items()}
+    others = ", ".join(f"{law} {_number(peak, 1e3)} mm" for law, peak in peaks.items() if law != best)
+    return f"best law {best}: largest rms x_top over frequency {_number(peaks.get(best), 1e3)} mm" + (
+        f" (others: {others})" if others else ""
     )
 
 

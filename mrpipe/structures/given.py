@@ -360,7 +360,14 @@ def device_position(
     """Return the connectivity vector w, shape (n,), of a device between two degrees of freedom, or one and ground.
 
     The displacement of the device is w'x = x_first - x_second; the first or the second may be the ground.
+
+    Raises
+    ------
+    UserError
+        If a degree of freedom is unknown, or both ends are the same.
     """
+    if str(first) in _GROUND and str(second) in _GROUND:
+        raise UserError(where, f"{first} to {second}", "connects the ground to itself", "give a degree of freedom")
     if str(first) in _GROUND:
         first, second = second, first
     w = np.zeros(frame.floors)

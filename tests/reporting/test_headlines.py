@@ -106,3 +106,20 @@ def test_tied_effects_are_in_the_line() -> None:
     assert "impact and yielding explain the residual equally well" in headline(
         "close-loop", tracing(effects=[], unexplained=left, tied=tied)
     )
+
+
+@pytest.mark.property
+def test_the_line_of_a_design_states_the_best_law_or_the_gains_of_all_dampers() -> None:
+    laws = {"fdns": {"peak_rms_x_top_m": 0.02}, "vd": {"peak_rms_x_top_m": 0.03}}
+    line = headline("design", {"best": "fdns", "laws": laws})
+    assert line == "best law fdns: largest rms x_top over frequency 20 mm (others: vd 30 mm)"
+    together = {
+        "dampers": {"base": {}, "roof": {}},
+        "best": {"peak_rms_x_top_m": 0.51},
+        "calibrated": {"peak_rms_x_top_m": 0.52},
+        "improvement": 0.0115,
+    }
+    line = headline("design", together)
+    assert line == (
+        "gains of base and roof together: largest rms x_top over frequency 510 mm, with the calibrated gains 520 mm"
+    )

@@ -104,6 +104,8 @@ def test_devices_by_name_and_number() -> None:
     for first, second in (("pier", "pier"), ("cable", "ground"), (4, "ground"), (0, "ground")):
         with pytest.raises(UserError):
             device_position(frame, first, second)
+    with pytest.raises(UserError, match="connects the ground to itself"):
+        device_position(frame, 0, "ground")
 
 
 @pytest.mark.property

@@ -113,7 +113,7 @@ def choose_damping(
         if first is not None:
             apart = abs(first.value - second.value)
             if apart > first.half_width + second.half_width + 0.1 * second.value:
-                findings.append(f"mode {mode}: damping is {first.value:.2g} by decay, {second.value:.2g} by sweep")
+                findings.append(f"mode {mode}: damping is {first.value:.2g} by decay, {second.value:.2g} by {other}")
     without = [str(mode) for mode in range(1, len(sweep) + 1) if mode not in decays]
     if without and decays and damping_from == "decay":
         tests = "forced tests" if other == "sweep" else f"{other} tests"
