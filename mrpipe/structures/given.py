@@ -19,6 +19,7 @@ from mrpipe.structures.given_checks import (
     symmetric,
     tell_of_asymmetric_damping,
     tell_of_changed_modes,
+    tell_of_equal_matrices,
 )
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
@@ -89,6 +90,7 @@ def structure_from_settings(
     tell_of_asymmetric_damping(full.damping, warn)
     complete = without_massless(full, warn)
     require_restoring_forces(complete)
+    tell_of_equal_matrices(complete, warn)
     if given == ["mode_shapes"]:
         tell_of_changed_modes(complete, settings.frequencies_hz, warn)
     return complete

@@ -18,6 +18,9 @@ SYMMETRY = 1e-8
 NO_STIFFNESS = 1e-6
 """A natural frequency below this share of the largest one stands for a motion without a restoring force."""
 
+UNIT_FACTORS = (1e-3, 1.0, 1e3, 1e6)
+"""Ratios of the units of stiffness and mass: N/m, kN/m and N/mm, MN/m with kg and t."""
+
 SAME_FREQUENCY = 1e-3
 """Relative difference up to which a frequency of the structure is the one that was given."""
 
@@ -114,6 +117,15 @@ def tell_of_asymmetric_damping(damping: FloatArray, warn: Callable[[str], None] 
             f"the damping matrix is not symmetric: its entry [{row}, {column}] differs from its mirror image by "
             f"{asymmetry:.1e} of the largest entry. It is used as it is, and the damping ratios are those of its "
             "symmetric part"
+        )
+
+
+def tell_of_equal_matrices(frame: Frame, warn: Callable[[str], None] | None) -> None:
+    """Warn where mass and stiffness have the same numbers, up to a decimal factor of their units."""
+    if warn is not None and any(np.array_equal(frame.stiffness, factor * frame.mass) for factor in UNIT_FACTORS):
+        warn(
+            "the stiffness matrix has the same numbers as the mass matrix, so that all natural frequencies are equal: "
+            "check that `mass` and `stiffness` do not name the same matrix"
         )
 
 

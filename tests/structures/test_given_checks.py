@@ -12,6 +12,7 @@ from mrpipe.structures.given_checks import (
     require_restoring_forces,
     tell_of_asymmetric_damping,
     tell_of_changed_modes,
+    tell_of_equal_matrices,
 )
 
 FRAME = shear_frame([2.0, 3.0, 1.0], [500.0, 400.0, 300.0], 0.02)
@@ -38,6 +39,17 @@ def test_asymmetric_damping_is_told() -> None:
     assert not warnings
     tell_of_asymmetric_damping(FRAME.damping + np.diag([1.0, 0.0], 1), warnings.append)
     assert len(warnings) == 1 and "[1, 2]" in warnings[0]
+
+
+def test_a_stiffness_that_is_the_mass_matrix_is_told() -> None:
+    warnings: list[str] = []
+    tell_of_equal_matrices(FRAME, warnings.append)
+    assert not warnings
+    # a floor that is equally stiff in both directions
+    tell_of_equal_matrices(Frame(np.diag([2.0, 2.0]), np.zeros((2, 2)), np.diag([500.0, 500.0])), warnings.append)
+    assert not warnings
+    tell_of_equal_matrices(Frame(FRAME.mass, FRAME.damping, 1e3 * FRAME.mass), warnings.append)
+    assert len(warnings) == 1 and "the same numbers as the mass matrix" in warnings[0]
 
 
 def test_modes_that_the_structure_does_not_have_are_told() -> None:
