@@ -76,7 +76,7 @@ def trust(facts: RunFacts) -> Section:
         section.table(
             "rivals",
             tables.rivals(loop),
-            "Effects that were fitted after a screening of all, each alone, and all parameters again.",
+            "Effects that a screening of all effects chose: each was fitted alone, and all parameters again.",
         )
         section.table("forms", tables.forms(loop), "Base forms that were tried, error on the validation tests.")
     inverse = facts.summary("train-inverse")
