@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -200,6 +200,20 @@ class Law:
         """Whether the law has gains, a network or an observer to calibrate."""
         return bool(self.gains) or bool({"network", "observer"} & self.needs)
 
+    def require_gains(self, names: Iterable[str], setting: str) -> None:
+        """Refuse gains that the law does not have.
+
+        Raises
+        ------
+        UserError
+            If there is one; the message names the setting.
+        """
+        known = self.gain_names
+        for name in names:
+            if name not in known:
+                remedy = f"it has: {', '.join(known) or 'none'}"
+                raise UserError(setting, name, f"law {self.name} has no such gain", remedy)
+
     def check(self, gains: Gains) -> None:
         """Check that the law has these gains and that their signs are right.
 
@@ -209,14 +223,10 @@ class Law:
             If the law does not have a gain, or a gain has the wrong sign.
         """
         where = f"calibrate.{self.name}"
-        known = self.gain_names
         for name, value in gains.items():
             if value == 0.0:
                 continue
-            if name not in known:
-                raise UserError(
-                    where, name, f"law {self.name} has no such gain", f"it has: {', '.join(known) or 'none'}"
-                )
+            self.require_gains([name], where)
             sign = self.signs.get(name)
             if sign is not None and value * sign < 0.0:
                 raise UserError(where, name, f"is {value:g}", f"law {self.name} needs a {_SIGNS[sign]} {name}")

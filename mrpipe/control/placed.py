@@ -160,11 +160,23 @@ def modes_together(
     return damping_together(frame, [item for item in found if item is not None], modes)
 
 
+def refuse_network(law: Law, where: str) -> None:
+    """Refuse a law that needs a network.
+
+    Raises
+    ------
+    UserError
+        If it needs one; `where` names the damper.
+    """
+    if "network" in law.needs:
+        problem = f"law {law.name} needs a network, which is trained for one damper"
+        raise UserError(where, "law", problem, "choose another law")
+
+
 def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> PlacedCalibration:
     law = law_named(damper.law)
     where = f"structure.dampers: {damper.name}"
-    if "network" in law.needs:
-        raise UserError(where, law.name, "needs a network, which is trained for one damper", "choose another law")
+    refuse_network(law, where)
     own = replace(options, mode=damper.mode, overrides={law.name: dict(damper.gains or {})})
     if law.observer is None:
         own = replace(own, weights=own.weights or Weights())  # they have no effect

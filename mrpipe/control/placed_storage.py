@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.control.limits import moving_modes, separated
 from mrpipe.control.lqg import Weights
-from mrpipe.control.placed import PlacedCalibration, PlacedDamper
+from mrpipe.control.placed import PlacedCalibration, PlacedDamper, refuse_network
 from mrpipe.control.storage import Calibrated, finite
 from mrpipe.control.together import TogetherDamping
 from mrpipe.errors import UserError
@@ -29,6 +30,19 @@ GROUP = "dampers"
 def damper_name(settings: DamperSettings, place: int) -> str:
     """Return the name of the damper at this place (from 0) of the list."""
     return settings.name or f"damper {place + 1}"
+
+
+def require_law(entry: DamperSettings, where: str) -> None:
+    """Refuse a damper whose law is unknown or needs a network.
+
+    Raises
+    ------
+    UserError
+        If it does; the message names the setting.
+    """
+    if entry.law not in law_names():
+        raise UserError(where, "law", f"{entry.law!r} is not a control law", nearest(entry.law, law_names()))
+    refuse_network(law_named(entry.law), where)
 
 
 def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode: int) -> list[PlacedDamper]:
@@ -52,8 +66,7 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
     result: list[PlacedDamper] = []
     for place, entry in enumerate(entries):
         where = f"structure.dampers[{place}]"
-        if entry.law not in law_names():
-            raise UserError(where, f"law: {entry.law}", "is not a control law", f"one of {', '.join(law_names())}")
+        require_law(entry, where)
         if "displacement" not in entry.sensors:
             raise UserError(where, "sensors", "lack the displacement of the damper", "add displacement")
         name = damper_name(entry, place)

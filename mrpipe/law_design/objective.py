@@ -66,6 +66,10 @@ class Limits:
         }
         return {name: max(0.0, peaks[name] / limit - 1.0) for name, limit in pairs.items() if math.isfinite(limit)}
 
+    def exceeded(self, peaks: Mapping[str, float]) -> dict[str, float]:
+        """Return the excess of a design over each limit that it does not keep, relative to the limit [1]."""
+        return {name: value for name, value in self.excess(peaks).items() if value > 0.0}
+
 
 @dataclass(frozen=True)
 class Motion:

@@ -96,11 +96,7 @@ def require_known(settings: DesignSettings) -> None:
     for name, gains in settings.fixed_gains.items():
         if name not in known:
             raise UserError("design.fixed_gains", name, "is not a control law", f"one of {', '.join(known)}")
-        own = known[name].gain_names
-        for gain in gains:
-            if gain not in own:
-                remedy = f"it has: {', '.join(own) or 'none'}"
-                raise UserError(f"design.fixed_gains.{name}", gain, f"law {name} has no such gain", remedy)
+        known[name].require_gains(gains, f"design.fixed_gains.{name}")
     require_quantities(settings.weights)
     if settings.band_rad_s is not None:
         require_band(settings.band_rad_s)

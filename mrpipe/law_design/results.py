@@ -30,7 +30,7 @@ def law_as_json(found: Designed, limits: Limits) -> dict[str, Any]:
         **{f"peak_{name}": value for name, value in best.peaks.items()},
         "resonance_rad_s": best.resonance_rad_s,
         "objective": best.value,
-        "exceeds_limits": {name: value for name, value in limits.excess(best.peaks).items() if value > 0.0},
+        "exceeds_limits": limits.exceeded(best.peaks),
         "calibrated": {
             "gains": law.gains_as_json(calibrated.gains),
             **{f"peak_{name}": value for name, value in calibrated.peaks.items()},

@@ -153,7 +153,7 @@ def design_as_json(rig: DampersRig, found: DampersDesign) -> dict[str, Any]:
         "best": _evaluation(best),
         "calibrated": _evaluation(calibrated),
         "improvement": 1.0 - best.value / calibrated.value,
-        "exceeds_limits": {name: value for name, value in found.limits.excess(best.peaks).items() if value > 0.0},
+        "exceeds_limits": found.limits.exceeded(best.peaks),
         "evaluations": len(found.designed.tried),
         "starts": starts_as_json(found.starts),
         "curves": {

@@ -104,26 +104,17 @@ def _together(frame: Frame, found: Sequence[PlacedCalibration]) -> dict[str, Any
 
 def _check(settings: Any) -> None:
     """Check that the laws, gains and models of the dampers are known, before the structure is read."""
-    from mrpipe.artifacts.yaml_source import nearest
-    from mrpipe.control.laws import law_named, law_names
+    from mrpipe.control.laws import law_named
+    from mrpipe.control.placed_storage import require_law
     from mrpipe.effects.damper import require_damper
-    from mrpipe.errors import UserError
 
     require_damper(settings.calibrate.damper, "calibrate.damper", ("identified",))
     for place, entry in enumerate(settings.structure.dampers):
         where = f"structure.dampers[{place}]"
         if entry.damper:
             require_damper(entry.damper, f"{where}.damper", ("identified",))
-        if entry.law not in law_names():
-            raise UserError(where, "law", f"{entry.law!r} is not a control law", nearest(entry.law, law_names()))
-        if "network" in law_named(entry.law).needs:
-            problem = f"law {entry.law} needs a network, which is trained for one damper"
-            raise UserError(where, "law", problem, "choose another law")
-        known = law_named(entry.law).gain_names
-        for name in entry.gains:
-            if name not in known:
-                remedy = f"it has: {', '.join(known) or 'none'}"
-                raise UserError(where, f"gains.{name}", f"law {entry.law} has no such gain", remedy)
+        require_law(entry, where)
+        law_named(entry.law).require_gains(entry.gains or {}, f"{where}.gains")
 
 
 VARIANTS = (
