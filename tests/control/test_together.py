@@ -14,7 +14,7 @@ from mrpipe.control.placed import PlacedDamper, calibrate_placed, modes_together
 from mrpipe.control.together import LinearDevice, damping_together, ground_response, linear_device
 from mrpipe.errors import UserError
 from mrpipe.structures import complex_modes, frequency_response, shear_frame
-from mrpipe.structures.given import device_position
+from mrpipe.structures.places import device_position
 
 FRAME = shear_frame([20.0] * 4, [3.0e4] * 4, np.full(4, 0.01), name="four storeys", source="test")
 FIRST, BETWEEN = device_position(FRAME, 1), device_position(FRAME, 3, 2)
