@@ -46,7 +46,7 @@ from mrpipe.simulation.several_dampers_parts import (
     I_STEPS,
     I_TRACK,
     SETTLED,
-    SETTLED_LAW,
+    SETTLED_EXACTLY,
     SLOPE,
     STATE_SIZE,
     SWEEPS,
@@ -101,7 +101,7 @@ def _motion_at_start(structure: Structure, state: FloatArray) -> Motion:
             known[d, V] += structure.positions[d, floor] * state[n + floor]
     return Motion(
         known, np.zeros(k), np.zeros(k), np.zeros((k, 4)), np.zeros(k), np.zeros(k), added, np.zeros((k, 3)),
-        np.zeros((k, 8)),
+        np.zeros((k, 9)),
     )  # fmt: skip
 
 
@@ -209,7 +209,7 @@ def _move_freely(
         answer[4] = motion.added[1, d, d] - 1.5 * flexibility / dt
         answer[5] = motion.added[2, d, d]
         answer[6] = 2.0 * motion.forces[d] - motion.previous[d] if track == TRACK_DAMPER else motion.forces[d]
-        answer[7] = motion.known[d, SLOPE]
+        answer[7], answer[8] = motion.known[d, SLOPE], flexibility
 
 
 @compiled_inside
@@ -217,7 +217,8 @@ def _find_forces(devices: Devices, motion: Motion, controllers: Controllers, tra
     """Find the forces at the end of the step, damper by damper, until no force changes; they are in `answer[:, 6]`."""
     k = motion.forces.shape[0]
     answer, starts, states = motion.answer, devices.parameter_starts, devices.state_starts
-    settled = SETTLED_LAW if track == TRACK_LAW else SETTLED
+    exactly = track == TRACK_LAW or np.any(answer[:, 8] > 0.0)
+    settled = SETTLED_EXACTLY if exactly else SETTLED
     for _ in range(SWEEPS):
         change = 0.0
         for d in range(k):

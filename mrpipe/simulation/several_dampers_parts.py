@@ -33,8 +33,16 @@ compiled_inside = njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=Tru
 
 TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
 SWEEPS = 40
-SETTLED, SETTLED_LAW = 1e-6, 1e-10
-"""Relative change of the forces between iterations at which a step ends, with dampers and with linear laws."""
+SETTLED, SETTLED_EXACTLY = 1e-6, 1e-10
+"""Relative change of the forces between iterations at which a step ends: with dampers, and with linear laws or braces.
+"""
+EXACT_N, EXACT, EXACT_ITERATIONS = 1e-10, 1e-12, 8
+"""Difference of answer and guess at which the search for the force of a damper behind a brace ends [N], the same as a
+share of the answer, and the iterations after which the usual tolerance is sufficient.
+
+The acceleration of the rod is a second difference of the force over the stiffness of the brace. It contains an error of
+the force 9/(4 k_b dt^2) times, so that the usual tolerance makes it useless in short steps.
+"""
 
 # --- integers of the run ---
 I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
@@ -171,7 +179,7 @@ class Motion(NamedTuple):
     free
         Displacement, velocity and acceleration at the end of the step without the forces there, shape (k, 3).
     answer
-        Arguments of `chain_force` for each damper, shape (k, 8).
+        Arguments of `chain_force` for each damper, shape (k, 9).
     """
 
     known: FloatArray
@@ -201,11 +209,13 @@ def chain_force(
     """Return the force of a damper at the end of a step, by a secant within a bracket; `trial` becomes its state.
 
     `motion` holds displacement, velocity and acceleration without the force, what one newton adds to each, the first
-    guess of the force, and the slope of the damper's answer that the step before ended with.
+    guess of the force, the slope of the damper's answer that the step before ended with, and the flexibility of the
+    brace.
     """
     guess, slope = motion[6], motion[7]
     found, last_guess, last_found = guess, 0.0, 0.0
     low, high = -math.inf, math.inf
+    braced = motion[8] > 0.0
     for iteration in range(ITERATIONS):
         # written out, because a function with these arrays counts the references to them in each iteration
         for index in range(before.shape[0]):
@@ -216,13 +226,14 @@ def chain_force(
         wire[DRIVE] = device[CURRENT]
         advance(functions, parameters, parameter_offsets, state_offsets, trial, wire, dt)
         found = wire[FORCE]
-        if settled(found, guess):
+        exactly = braced and iteration < EXACT_ITERATIONS
+        if settled(found, guess) and (not exactly or abs(found - guess) <= EXACT_N + EXACT * abs(found)):
             motion[7] = slope
             return found
         if iteration > 0 and guess != last_guess:
             # before the last correction, because a brace makes the slope steep and different from step to step
             slope = slope_between(found, guess, last_found, last_guess)
-        if nearly_settled(found, guess):
+        if nearly_settled(found, guess) and not exactly:
             motion[7] = slope
             return secant(found, guess, slope)
         low, high = narrowed(low, high, found, guess)
