@@ -9,12 +9,15 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
+    COMMAND_FORCE,
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
     MEASURED_FORCE,
     MEASURED_GROUND,
     MEASURED_VELOCITY,
+    OBSERVER_FORCE,
+    S_REQUEST,
 )
 from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, DRIVE, FORCE, VELOCITY, advance
 from mrpipe.simulation.implicit_force import (
@@ -149,11 +152,25 @@ class Controllers(NamedTuple):
 
 
 class Central(NamedTuple):
-    """The central regulator: its matrices and sensors, the numbers of its dampers, its estimate and its forces [N]."""
+    """The central regulator of some of the dampers.
+
+    Attributes
+    ----------
+    regulator
+        F, G, H, K of :class:`~mrpipe.control.central.CentralRegulator`, and for each sensor the number of the damper
+        (of all dampers) and the channel, shape (p, 2).
+    members
+        Numbers of its dampers.
+    estimate, readings
+        Estimated state, and last good reading of each sensor.
+    forces, wanted
+        Forces of its dampers that the observer takes, and forces that it requests [N].
+    """
 
     regulator: Any
     members: IntArray
     estimate: FloatArray
+    readings: FloatArray
     forces: FloatArray
     wanted: FloatArray
 
@@ -285,19 +302,32 @@ def read_sensors(
 
 
 @njit(cache=True)
-def regulate(
-    regulator: Any, estimate: FloatArray, measured: FloatArray, forces: FloatArray, wanted: FloatArray
-) -> None:  # fmt: skip
-    """Advance the observer of the central regulator and put the forces for the coming sample into `wanted`.
+def regulate(central: Central, measured: FloatArray) -> None:
+    """Advance the observer of the central regulator and put the forces for the coming sample into `central.wanted`.
 
-    `regulator` holds F, G, H, K and the sensors: the number of the damper (of all dampers) and the channel of each.
+    A missing reading is replaced by the last good one.
     """
-    F, G, H, K, sensors = regulator
-    following = F @ estimate + G @ forces
+    F, G, H, K, sensors = central.regulator
     for row in range(sensors.shape[0]):
         reading = measured[int(sensors[row, 0]), int(sensors[row, 1])]
         if math.isfinite(reading):
-            for index in range(following.shape[0]):
-                following[index] += H[index, row] * reading
-    estimate[:] = following
-    wanted[:] = -(K @ estimate)
+            central.readings[row] = reading
+    central.estimate[:] = F @ central.estimate + G @ central.forces + H @ central.readings
+    central.wanted[:] = -(K @ central.estimate)
+
+
+@compiled_inside
+def request_forces(controllers: Controllers, central: Central, sample: int) -> None:
+    """Let the central regulator request the forces of its dampers.
+
+    Its observer takes the measured force of a damper or, where the controller says so, the last desired one.
+    """
+    for index in range(central.members.shape[0]):
+        d = central.members[index]
+        if controllers.layouts[controllers.places[d, 1] + OBSERVER_FORCE] == 0:
+            central.forces[index] = controllers.commands[d, max(sample - 1, 0), COMMAND_FORCE]
+        elif math.isfinite(controllers.measured[d, MEASURED_FORCE]):
+            central.forces[index] = controllers.measured[d, MEASURED_FORCE]
+    regulate(central, controllers.measured)
+    for index in range(central.members.shape[0]):
+        controllers.memories[controllers.places[central.members[index], 2] + S_REQUEST] = central.wanted[index]
