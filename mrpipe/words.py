@@ -77,13 +77,15 @@ def number(value: Any, digits: int = 3) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-def in_percent(ratio: float, decimals: int = 0, *, digits: int | None = None, signed: bool = False) -> str:
+def in_percent(
+    ratio: float | None, decimals: int = 0, *, digits: int | None = None, signed: bool = False, exact: bool = False
+) -> str:
     """Return a ratio in percent, with a space before the sign as SI requires.
 
     Parameters
     ----------
     ratio
-        The ratio [1].
+        The ratio [1]; `-` is returned for None.
     decimals
         Number of decimals.
     digits
@@ -91,8 +93,13 @@ def in_percent(ratio: float, decimals: int = 0, *, digits: int | None = None, si
         finite.
     signed
         Whether a positive number has a plus sign.
+    exact
+        Whether the ratio was chosen, such as a tolerance, so that zeros at its end do not state its accuracy and are
+        left out.
     """
+    if ratio is None:
+        return "-"
     if digits is not None:
-        shown = number(100.0 * ratio, digits)
+        shown = f"{100.0 * ratio:.{digits}g}" if exact else number(100.0 * ratio, digits)
         return shown if shown == "-" else f"{'+' if signed and ratio > 0.0 else ''}{shown} %"
     return f"{100.0 * ratio:{'+' if signed else ''}.{decimals}f} %"

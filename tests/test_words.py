@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+import mrpipe
 from mrpipe.errors import UserError
 from mrpipe.words import counted, duration, in_percent, listed, noun, shell_word, shortest
 
@@ -34,6 +36,24 @@ def test_a_path_is_one_word_of_a_shell() -> None:
     for path in ("runs/a", "Mein Projekt ß", "it's"):
         assert shlex.split(f"cd {shell_word(Path(path))}") == ["cd", path]
     assert shell_word("runs/a") == "runs/a"
+
+
+def test_one_function_writes_percentages() -> None:
+    local = re.compile(r"\{[^{}]*(:[^{}]*[defg]|number\([^{}]*\))\} %")
+    package = Path(mrpipe.__file__).parent
+    found = [
+        f"{path.relative_to(package)}: {part[0]}"
+        for path in package.rglob("*.py")
+        if path.name != "words.py" or path.parent != package
+        for part in local.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert not found, "mrpipe.words.in_percent writes a ratio in percent"
+
+
+def test_an_exact_percentage_has_no_zeros_at_its_end() -> None:
+    shown = [in_percent(ratio, digits=3, exact=True) for ratio in (0.05, 0.1, 0.125, 2.0, 1e-9)]
+    assert shown == ["5 %", "10 %", "12.5 %", "200 %", "1e-07 %"]
+    assert in_percent(None) == "-" and in_percent(None, digits=2) == "-"
 
 
 def test_percentages() -> None:

@@ -17,6 +17,7 @@ from mrpipe.errors import UserError
 from mrpipe.fitting.comparison import Comparison, JudgedFit
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.verdict.summary import Tracing
+from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -155,7 +156,8 @@ class DamperFit:
 
         return (
             f"{self.damper.form}: validation NRMSE {self.chosen.validation.nrmse:.4f}, "
-            f"fit {self.chosen.validation.fit_percent:.1f} %. {reason_of_choice(self.chosen, self.comparison.judged)}"
+            f"fit {in_percent(self.chosen.validation.fit_percent / 100.0, 1)}. "
+            f"{reason_of_choice(self.chosen, self.comparison.judged)}"
         )
 
     def to_frame(self) -> pd.DataFrame:

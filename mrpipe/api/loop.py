@@ -54,7 +54,7 @@ class Simulated:
     def __str__(self) -> str:
         return (
             f"{self.law}: rms x_top {1e3 * self.indices['rms_x_top_m']:.2f} mm, "
-            f"x1 {1e3 * self.indices['rms_x1_m']:.2f} mm, a1 {self.indices['rms_a1_m_s2']:.3g} m/s^2"
+            f"x1 {1e3 * self.indices['rms_x1_m']:.2f} mm, a1 {self.indices['rms_a1_m_s2']:.3g} m/s²"
         )
 
     def to_frame(self) -> pd.DataFrame:

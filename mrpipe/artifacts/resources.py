@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from mrpipe.artifacts.types import FloatArray
+from mrpipe.artifacts.yaml_source import YamlSource, read_yaml, shown
 from mrpipe.errors import UserError
 
 
@@ -77,7 +77,6 @@ def load_parameter_set(kind: str, name: str | Path) -> ParameterSet:
     UserError
         If there is no such set, or an entry lacks its value or unit.
     """
-    from mrpipe.units import to_si
 
     path = Path(name)
     if path.suffix not in {".yaml", ".yml"}:
@@ -85,24 +84,38 @@ def load_parameter_set(kind: str, name: str | Path) -> ParameterSet:
     if not path.is_file():
         known = sorted(item.stem for item in (config_directory() / kind).glob("*.yaml"))
         raise UserError(path, "", "no such parameter set", f"known sets: {', '.join(known)}")
-    try:
-        content: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise UserError(path, "", f"not valid YAML ({error})", "correct the syntax") from error
-    values: dict[str, FloatArray] = {}
-    units: dict[str, str] = {}
-    for key, entry in content["parameters"].items():
-        if not isinstance(entry, dict) or not {"value", "unit"} <= entry.keys():
-            raise UserError(path, f"parameters.{key}", "has no value or no unit", "write {value: …, unit: …}")
-        values[key] = np.asarray(
-            to_si(np.asarray(entry["value"], dtype=np.float64), str(entry["unit"]), where=str(path))
-        )
-        units[key] = str(entry["unit"])
+    file = read_yaml(path)
+    content = file.content
+    for key in ("model", "source", "parameters"):
+        if content.get(key) is None:
+            raise UserError(path, key, "is missing", f"write {key}: ... as the sets of configs/{kind} do")
+    if not isinstance(content["parameters"], dict):
+        raise file.error(("parameters",), "is not a mapping", "write a line `name: {value: ..., unit: ...}` for each")
+    values = {str(key): _in_si(file, str(key), entry) for key, entry in content["parameters"].items()}
     return ParameterSet(
         name=str(content.get("name", path.stem)),
         model=str(content["model"]),
         source=str(content["source"]),
         values=values,
-        units=units,
+        units={str(key): str(entry["unit"]) for key, entry in content["parameters"].items()},
         notes=str(content.get("notes", "")),
     )
+
+
+def _in_si(file: YamlSource, key: str, entry: Any) -> FloatArray:
+    """Return the value of a parameter in SI units."""
+    from mrpipe.units import to_si
+
+    place = ("parameters", key)
+    if not isinstance(entry, dict) or not {"value", "unit"} <= entry.keys():
+        raise file.error(place, "has no value or no unit", "write {value: ..., unit: ...}")
+    try:
+        value = np.asarray(entry["value"], dtype=np.float64)
+    except (TypeError, ValueError):
+        problem = f"is {shown(entry['value'])}"
+        raise file.error(
+            (*place, "value"), problem, "a number, or lists of numbers of equal length, expected"
+        ) from None
+    if not np.all(np.isfinite(value)):
+        raise file.error((*place, "value"), "is not finite", "write a finite number")
+    return np.asarray(to_si(value, str(entry["unit"]), where=f"{file.path}: {file.where((*place, 'unit'))}"))

@@ -101,7 +101,7 @@ def floor_profiles(
     figure, axes = figure_with_axes(1, 2, width=8.0, height=3.6)
     for axis, peaks, name in (
         (axes[0, 0], displacement, "displacement [m]"),
-        (axes[0, 1], acceleration, "acceleration [m/s^2]"),
+        (axes[0, 1], acceleration, "acceleration [m/s²]"),
     ):
         for number, (law, values) in enumerate(peaks.items()):
             colour = MEASURED if law == "uncontrolled" else COLOURS[(number - 1) % 8]

@@ -98,7 +98,7 @@ def _more_facts(summary: Mapping[str, Any]) -> list[str]:
         details = summary["motion_details"]
         peaks = ", ".join(f"{value:.4g}" for value in details["peaks_m_s2"])
         lines.append(
-            f"motion {summary['motion']}: peaks {peaks} m/s^2, {details['duration_s']:.4g} s at "
+            f"motion {summary['motion']}: peaks {peaks} m/s², {details['duration_s']:.4g} s at "
             f"{details['interval_s']:g} s, unit in the file {details['unit_in_file']} ({details['unit_from']})"
         )
         lines += [f"  {note}" for note in details["notes"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from mrpipe.errors import UserError
@@ -53,6 +53,58 @@ def refuse_wrong_campaigns(pipeline: Pipeline, names: Collection[str]) -> None:
             and key == "frame"
         ):
             require_frame_tests(campaign)
+
+
+def refuse_missing_campaigns(pipeline: Pipeline, names: Sequence[str], *, where_possible: bool = False) -> None:
+    """Refuse stages whose campaign the configuration does not name, before files of an earlier run are changed.
+
+    Parameters
+    ----------
+    pipeline
+        The stages and their configuration.
+    names
+        Stages that will be built.
+    where_possible
+        Whether it is enough that one of the stages has data.
+
+    Raises
+    ------
+    UserError
+        If that is so, or if the campaign is not there; the message names the setting of the campaign.
+    """
+    from mrpipe.cli.checking import measured_campaigns, require_path, with_required
+    from mrpipe.config.located import located
+
+    needed = with_required(pipeline.stages, names)
+    for key, path in measured_campaigns(pipeline.loaded).items():
+        if any(f"campaign:{key.replace('_', '-')}" in pipeline.stages[name].all_inputs for name in needed):
+            require_path(pipeline.loaded, key, path)
+    lacking = {name: item for name in names if (item := pipeline.sources.lacking(name))}
+    if not lacking or (where_possible and len(lacking) < len(names)):
+        return
+    name, item = next(iter(lacking.items()))
+    rig = item.partition(":")[2]
+    problem = (
+        f"is null, and {name} reads a {rig} campaign{pipeline.sources.demanded_by_settings(pipeline.stages[name])}"
+    )
+    remedy = "give its path here or with --campaign DIR, or write `laboratory` for the virtual rig"
+    raise located(UserError("campaigns", rig.replace("-", "_"), problem, remedy), pipeline.loaded)
+
+
+def refuse_wrong_settings(pipeline: Pipeline, names: Collection[str]) -> None:
+    """Check the settings of stages and of all that they need, before the first of them is built.
+
+    Raises
+    ------
+    UserError
+        If a stage cannot work with its settings; the message names the file and the line.
+    """
+    from mrpipe.cli.checking import with_required
+
+    needed = with_required(pipeline.stages, names)
+    for name in pipeline.stages:
+        if name in needed:
+            pipeline.check(name)
 
 
 def refuse_constant_drive(pipeline: Pipeline, names: Collection[str]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import UserError
-from mrpipe.words import counted
+from mrpipe.words import counted, shortest
 
 if TYPE_CHECKING:
     from mrpipe.campaigns import Campaign
@@ -74,8 +74,9 @@ def check_stages(loaded: LoadedConfig) -> None:
     refuse_other_rig(loaded)
     try:
         config = without_own_effects(loaded)
+        needed = needed_stages(loaded)
         for name, stage in _stages(loaded).items():
-            if name in loaded.config.stages and stage.check is not None:
+            if name in needed and stage.check is not None:
                 stage.check(SettingsView(config, stage.settings, name))
     except UserError as error:
         raise located(error, loaded) from error
@@ -87,6 +88,31 @@ def measured_campaigns(loaded: LoadedConfig) -> dict[str, Path]:
 
     sources = loaded.config.campaigns.model_dump()
     return {key: Path(source) for key, source in sources.items() if source not in (None, LABORATORY)}
+
+
+def require_path(loaded: LoadedConfig, key: str, path: Path) -> None:
+    """Refuse a campaign that is not there.
+
+    Parameters
+    ----------
+    loaded
+        The configuration.
+    key
+        Its key under `campaigns`.
+    path
+        Its directory or file.
+
+    Raises
+    ------
+    UserError
+        If that is so; the message names the line of the configuration.
+    """
+    from mrpipe.config.located import located
+
+    if not path.exists():
+        problem = f"there is no {shortest(path)}"
+        remedy = "name a directory that holds campaign.yaml, or such a file, relative to the configuration"
+        raise located(UserError("campaigns", key, problem, remedy), loaded)
 
 
 def check_headers(loaded: LoadedConfig) -> None:
@@ -103,6 +129,7 @@ def check_headers(loaded: LoadedConfig) -> None:
     from mrpipe.cli.own_effects import own_effects
 
     for key, path in measured_campaigns(loaded).items():
+        require_path(loaded, key, path)
         header = read_header(path)
         if header.rig != RIGS[key]:
             right = next(other for other, rig in RIGS.items() if rig == header.rig)
@@ -203,6 +230,7 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
     """
     from mrpipe.campaigns import load_campaign
     from mrpipe.campaigns.plausibility import judge
+    from mrpipe.cli.closed_loop_checks import without_law, without_modes
     from mrpipe.cli.own_effects import not_tried
 
     measured = measured_campaigns(loaded)
@@ -213,7 +241,7 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
             continue
         if key == "closed_loop" and measured[key] == measured.get("frame"):
             result.campaigns[key] = f"{result.campaigns['frame']}, the same as frame"
-            result.findings[key] = _without_law(load_campaign(measured[key]))
+            result.findings[key] = without_law(load_campaign(measured[key]))
             continue
         campaign = load_campaign(measured[key])
         result.campaigns[key] = f"{campaign.name}: {counted(len(campaign.recordings), 'test')}"
@@ -229,30 +257,8 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
             *not_tried(loaded, key),
         ]
         if key == "closed_loop":
-            result.findings[key] += _without_law(campaign)
+            result.findings[key] += without_law(campaign) + without_modes(loaded, campaign)
     return result
-
-
-def _without_law(campaign: Campaign) -> list[Finding]:
-    """Return closed-loop tests that do not state their law, or not the gains of a law that has gains."""
-    from mrpipe.campaigns.plausibility import Finding
-    from mrpipe.control.laws import law_named, law_names
-
-    findings = []
-    for test in campaign.recordings:
-        if test.kind != "closed-loop":
-            continue
-        law = str(test.details.get("law") or "")
-        wanted = law_named(law).gain_names if law in law_names() else ()
-        if law and (test.details.get("gains") or not wanted):
-            continue
-        sentence = "its control law is not stated, so close-loop does not compare this test"
-        remedy = "write law: and gains: of this test"
-        if law:
-            sentence = f"the gains of law {law} are not stated, so the calibrated ones are taken"
-            remedy = f"write gains: {{{', '.join(f'{name}: ...' for name in wanted)}}} as they were in this test"
-        findings.append(Finding("law-unknown", "warning", sentence, remedy, test=test.name))
-    return findings
 
 
 def _no_validation(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[Finding]:

@@ -13,7 +13,7 @@ _LINE = 118
 _UNITS = {
     "_n_s_m": "N s/m",
     "_rad_s": "rad/s",
-    "_m_s2": "m/s^2",
+    "_m_s2": "m/s²",
     "_m_s": "m/s",
     "_n_m": "N/m",
     "_percent": "%",

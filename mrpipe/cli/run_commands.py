@@ -43,7 +43,7 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
     CheckFailed
         The same, if a stage failed for another reason.
     """
-    from mrpipe.cli.campaign_refusal import refuse_wrong_campaigns
+    from mrpipe.cli.campaign_refusal import refuse_wrong_campaigns, refuse_wrong_settings
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session, stage_runner
@@ -57,10 +57,8 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
         if options.force:
             pipeline.force = frozenset(pipeline.stages)
         pipeline.keep_going = True
-        for name in names:
-            if name != "report":
-                pipeline.check(name)
         to_build = [name for name in names if name != "report"]
+        refuse_wrong_settings(pipeline, to_build)
         refuse_wrong_campaigns(pipeline, to_build)
         with compiled_ahead([pipeline.stages[name].run.__module__ for name in to_build], pipeline.jobs) as compiling:
             build_side_by_side(pipeline, to_build, functools.partial(stage_runner, options), compiling)

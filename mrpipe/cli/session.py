@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from mrpipe.words import listed, shell_word
 
 if TYPE_CHECKING:
     from mrpipe.config.loader import LoadedConfig
-    from mrpipe.pipeline.execution import StageRunner
+    from mrpipe.pipeline.execution import Outcome, StageRunner
     from mrpipe.pipeline.runner import Pipeline
 
 
@@ -187,7 +187,11 @@ def _require_own(directory: Path) -> None:
 
 @contextmanager
 def session(options: CommonOptions) -> Iterator[Pipeline]:
-    """Yield a pipeline that holds its run directory."""
+    """Yield a pipeline that holds its run directory.
+
+    A refusal leaves nothing in a new directory, and the configuration of an existing one as it was.
+    """
+    from mrpipe.artifacts import atomic_path
     from mrpipe.pipeline.lock import run_lock
 
     loaded = load(options)
@@ -195,14 +199,22 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
     _require_own(directory)
     new = [folder for folder in (directory, *directory.parents) if not folder.exists()]
     with run_lock(directory):
+        kept = directory / "config.yaml"
+        before = kept.read_bytes() if kept.is_file() else None
+        outcomes: Mapping[str, Outcome] = {}
         try:
             _warn_of_another_configuration(options, loaded, directory)
             pipeline = pipeline_of(options, loaded)
+            outcomes = pipeline.outcomes
             pipeline.write_config()
             yield pipeline
         except UserError:
             if new:
                 _remove_without_results(new)
+            elif before is not None and not any(item.what == "built" for item in outcomes.values()):
+                # the results are still those of the configuration that was kept
+                with atomic_path(kept) as temporary:
+                    temporary.write_bytes(before)
             raise
 
 

@@ -20,8 +20,8 @@ from mrpipe.control.storage import Calibrated, finite
 from mrpipe.control.together import TogetherDamping
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame, natural_modes
-from mrpipe.structures.given import degree_of_freedom, device_position
 from mrpipe.structures.options import DamperSettings
+from mrpipe.structures.places import degree_of_freedom, device_position
 
 GROUP = "dampers"
 """Entry of control.h5 that holds the calibration of several dampers."""

@@ -264,7 +264,10 @@ def damper_from_parameter_set(parameters: ParameterSet) -> DamperModel:
         If the model is unknown or a parameter is missing.
     """
     source = f"configs/dampers/{parameters.name}"
-    given = {name: float(value) for name, value in parameters.values.items()}
+    for name, value in parameters.values.items():
+        if value.size != 1:
+            raise UserError(source, f"parameters.{name}", f"has {value.size} values", "give one number")
+    given = {name: float(value.item()) for name, value in parameters.values.items()}
     known = base_forms()
     if parameters.model not in known:
         raise UserError(source, "model", f"{parameters.model!r} is not a base form", f"known: {', '.join(known)}")

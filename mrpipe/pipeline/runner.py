@@ -148,7 +148,7 @@ class Pipeline:
         # inputs that no campaign can give come first, so that nothing is built for a stage that is then skipped
         for item in sorted(stage.inputs, key=self.sources.configured):
             missing = missing or self._provide(item, stage.inputs)
-        missing += self._demanded_by_settings(stage) if missing else ""
+        missing += self.sources.demanded_by_settings(stage) if missing else ""
         for item in () if missing else stage.preferred_inputs:
             if self.sources.configured(item):
                 self._provide_preferred(item)
@@ -157,14 +157,6 @@ class Pipeline:
             if self._wanted(item, together):
                 self._provide_optional(item)
         return self._skip(stage, missing) if missing else self._reuse_or_run(stage)
-
-    def _demanded_by_settings(self, stage: Stage) -> str:
-        """Return which settings make a stage need a campaign that is not configured, so that a user can change them."""
-        required = stage.required_by(self.loaded.config)
-        named = [
-            setting for item, settings in required.items() if not self.sources.configured(item) for setting in settings
-        ]
-        return f"; {stage.name} needs it because of {', '.join(named)}" if named else ""
 
     def _failed(self, stage: Stage, error: Exception) -> Outcome:
         """Record a failure: outputs of an earlier run are kept and count as stale."""
@@ -228,9 +220,7 @@ class Pipeline:
         provider = self.sources.provider(name)
         if provider is None:
             if self.sources.path(name) is None:
-                rig = name.partition(":")[2]
-                given = "the one given with --campaign is of another kind; " if self.campaign_given else ""
-                return f"there is no {rig} campaign ({given}give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
+                return self.sources.no_campaign(name, campaign_given=self.campaign_given)
             return ""
         outcome = self.build(provider)
         if outcome.what == "failed" and name in required:

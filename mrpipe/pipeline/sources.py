@@ -104,6 +104,35 @@ class Sources:
             return self.path(name) is not None
         return all(self.configured(item) for item in self.stages[provider].inputs)
 
+    def no_campaign(self, name: str, *, campaign_given: bool) -> str:
+        """Return the reason why a campaign cannot be read that the configuration does not name.
+
+        Parameters
+        ----------
+        name
+            The input.
+        campaign_given
+            The user named a campaign on the command line.
+        """
+        rig = name.removeprefix(CAMPAIGN)
+        given = "the one given with --campaign is of another kind; " if campaign_given else ""
+        return f"there is no {rig} campaign ({given}give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
+
+    def demanded_by_settings(self, stage: Stage) -> str:
+        """Return which settings make a stage need a campaign that is not configured, so that a user can change them."""
+        required = stage.required_by(self.loaded.config)
+        named = [setting for item, settings in required.items() if not self.configured(item) for setting in settings]
+        return f"; {stage.name} needs it because of {', '.join(named)}" if named else ""
+
+    def lacking(self, name: str) -> str:
+        """Return the campaign without which a stage cannot be built; empty if there are all."""
+        for item in self.stages[name].inputs:
+            provider = self.provider(item)
+            lacking = self.lacking(provider) if provider is not None else "" if self.path(item) is not None else item
+            if lacking:
+                return lacking
+        return ""
+
     def digest(self, name: str, path: Path) -> str:
         """Return the digest of an input; of a campaign, that of all its files."""
         if not path.exists():

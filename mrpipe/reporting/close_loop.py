@@ -224,7 +224,7 @@ def _loop(sink: Sink, found: Mapping[str, Any]) -> None:
         "laws-over-band",
         pd.DataFrame(band_table(found)),
         f"Every law at its own resonance: the largest responses to harmonic base motion from {low:.3g} to {high:.3g} "
-        f"rad/s at {found['over_band']['base_amplitude_m_s2']:.3g} m/s2. The laws are ranked by the top displacement.",
+        f"rad/s at {found['over_band']['base_amplitude_m_s2']:.3g} m/s². The laws are ranked by the top displacement.",
     )
     rows = []
     for item in found["tests"]:

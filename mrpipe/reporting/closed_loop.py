@@ -24,7 +24,7 @@ def law_table(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     rows = []
     for item in found["laws"]:
         row: dict[str, Any] = {"law": item["law"]}
-        for key, unit, factor in (("rms_x_top_m", "mm", 1e3), ("rms_x1_m", "mm", 1e3), ("rms_a1_m_s2", "m/s2", 1.0)):
+        for key, unit, factor in (("rms_x_top_m", "mm", 1e3), ("rms_x1_m", "mm", 1e3), ("rms_a1_m_s2", "m/s²", 1.0)):
             name = key.removesuffix("_m").removesuffix("_m_s2").removesuffix("_s2")
             for when in COLUMNS:
                 values = item.get(when, {})
@@ -50,7 +50,7 @@ def band_table(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             grows = "diverged" in values
             row[f"resonance {when} [rad/s]"] = "grows" if grows else values["resonance_rad_s"]
             row[f"largest rms_x_top {when} [mm]"] = "grows" if grows else 1e3 * values["peak_rms_x_top_m"]
-            row[f"largest rms_a1 {when} [m/s2]"] = "grows" if grows else values["peak_rms_a1_m_s2"]
+            row[f"largest rms_a1 {when} [m/s²]"] = "grows" if grows else values["peak_rms_a1_m_s2"]
         rows.append(row)
     return rows
 

@@ -43,7 +43,7 @@ def errors_in_words(found: Mapping[str, Any]) -> str:
 
     def pair(name: str) -> str:
         error = found.get(name) or {}
-        return f"{_percent(error.get('before'))} before and {_percent(error.get('after'))} after"
+        return f"{in_percent(error.get('before'), 1)} before and {in_percent(error.get('after'), 1)} after"
 
     text = (
         f"The model misses the measured RMS displacement of the top floor by {pair('rms_x_top_error')} (RMS over the "
@@ -80,7 +80,7 @@ def ranking_in_words(found: Mapping[str, Any]) -> str:
     low, high = found["over_band"]["band_rad_s"]
     over = (
         f"by the largest RMS top displacement from {low:.3g} to {high:.3g} rad/s at a base acceleration of "
-        f"{found['over_band']['base_amplitude_m_s2']:.3g} m/s^2"
+        f"{found['over_band']['base_amplitude_m_s2']:.3g} m/s²"
     )
     if not found["plant"]["effects"]:
         return f"The damper stays as it is, and so does the ranking of the laws {over}: {names} (the best first)."
@@ -160,7 +160,3 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
         f"On the damper with the effect it changes the largest RMS top displacement: {named}; the other laws stay "
         "within 1 %."
     )
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else in_percent(value, 1)

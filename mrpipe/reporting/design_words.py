@@ -21,8 +21,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     sentences.append(f"The objective is {summary['objective']}; it is {best['objective']:.3f}.")
     if best["improvement"] > 0.005:
         sentences.append(f"This is {in_percent(best['improvement'])} better than at its calibrated gains.")
-    for name, excess in best["exceeds_limits"].items():
-        sentences.append(f"No design keeps all limits: this one exceeds that of {name} by {in_percent(excess, 1)}.")
+    sentences += [f"{line[0].upper()}{line[1:]}." for line in exceeded_limits(best["exceeds_limits"])]
     others = sorted(
         ((name, item) for name, item in summary["laws"].items() if name != summary["best"]),
         key=lambda entry: float(entry[1]["objective"]),
@@ -51,14 +50,28 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     return " ".join(sentences)
 
 
+def exceeded_limits(excesses: Mapping[str, float]) -> list[str]:
+    """Return a clause for each limit that the best design does not keep.
+
+    Parameters
+    ----------
+    excesses
+        Name of the limit -> excess of the best design over the limit [1], as `exceeds_limits` in the JSON.
+    """
+    return [
+        f"no design keeps all limits: the best one exceeds that of {name} by {in_percent(excess, 1)}"
+        for name, excess in excesses.items()
+    ]
+
+
 def _confirmed(found: Mapping[str, Any]) -> str:
     design, calibrated = found["design"], found["calibrated"]
     return (
         f"At half the step of the simulation and with other sensor noise, the best design of all ({design['law']}, "
         f"{gains_in_words(design['gains']) or 'no gains'}) has a largest RMS top displacement of "
-        f"{1e3 * design['peak_rms_x_top_m']:.1f} mm and top acceleration of {design['peak_rms_a_top_m_s2']:.2f} m/s^2; "
+        f"{1e3 * design['peak_rms_x_top_m']:.1f} mm and top acceleration of {design['peak_rms_a_top_m_s2']:.2f} m/s²; "
         f"the best law at its calibrated gains ({calibrated['law']}) has {1e3 * calibrated['peak_rms_x_top_m']:.1f} mm "
-        f"and {calibrated['peak_rms_a_top_m_s2']:.2f} m/s^2. The displacement of the design is "
+        f"and {calibrated['peak_rms_a_top_m_s2']:.2f} m/s². The displacement of the design is "
         f"{_smaller(found['improvement_x_top'])}, its acceleration {_smaller(found['improvement_a_top'])}."
     )
 
@@ -95,7 +108,7 @@ def in_lines(summary: Mapping[str, Any]) -> list[str]:
     summary
         Summary of a design for one damper.
     """
-    head = ("law", "best gains", "x_top [mm]", "a_top [m/s2]", "calibrated gains", "x_top [mm]", "a_top [m/s2]")
+    head = ("law", "best gains", "x_top [mm]", "a_top [m/s²]", "calibrated gains", "x_top [mm]", "a_top [m/s²]")
     rows = [head, *(_row(name, item) for name, item in _ordered(summary))]
     widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

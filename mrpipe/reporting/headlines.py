@@ -36,7 +36,7 @@ def _number(value: Any, factor: float = 1.0, digits: int = 3) -> str:
 
 
 def _fit(percent: float | None) -> str:
-    return "not defined" if percent is None else f"{_number(percent)} %"
+    return "not defined" if percent is None else in_percent(percent / 100.0, digits=3)
 
 
 def _prepared(summary: Mapping[str, Any]) -> str:
@@ -67,7 +67,7 @@ def _training(summary: Mapping[str, Any]) -> str:
 def _simulation(summary: Mapping[str, Any]) -> str:
     response = (
         f"rms x_top {_number(summary.get('rms_x_top_m'), 1e3)} mm, x1 {_number(summary.get('rms_x1_m'), 1e3)} mm, "
-        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2 relative to the ground"
+        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s² relative to the ground"
     )
     dampers = summary.get("dampers")
     if dampers:

@@ -19,6 +19,7 @@ from mrpipe.reporting.places import ROTATION, by_direction, floor_names
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
 from mrpipe.structures import Frame
+from mrpipe.words import in_percent
 
 _MOST_POINTS = 4000
 _MOST_SHAPES = 12
@@ -196,6 +197,11 @@ def verification(result: TimeVerification) -> Figure:
         part = slice(max(0, centre - half), centre + half)
         axis.plot(result.time_s[part], result.measured[part, floor], color=MEASURED, linewidth=0.9, label="measured")
         axis.plot(result.time_s[part], result.simulated[part, floor], color=MODEL, linewidth=0.9, label="simulated")
-        label(axis, "time [s]", "response", f"floor {result.floors[floor]}: fit {result.fit_percent[floor]:.1f} %")
+        label(
+            axis,
+            "time [s]",
+            "response",
+            f"floor {result.floors[floor]}: fit {in_percent(result.fit_percent[floor] / 100.0, 1)}",
+        )
         axis.legend(fontsize=7, frameon=False)
     return figure

@@ -28,8 +28,8 @@ def describe(sink: Sink, law: str, curves: Curves) -> None:
     sink.text(
         f"Law {law}: the loop resonates at {nominal.resonance_rad_s:.2f} rad/s, where the RMS displacement of the top "
         f"floor is {1e3 * nominal.peak('rms_x_top_m'):.1f} mm under a harmonic base acceleration of "
-        f"{nominal.base_amplitude_m_s2:.3g} m/s^2. The largest RMS acceleration of floor 1 over the band is "
-        f"{nominal.peak('rms_a1_m_s2'):.2f} m/s^2. The standard error of these values is "
+        f"{nominal.base_amplitude_m_s2:.3g} m/s². The largest RMS acceleration of floor 1 over the band is "
+        f"{nominal.peak('rms_a1_m_s2'):.2f} m/s². The standard error of these values is "
         f"{in_percent(max(nominal.peak_error(name) / nominal.peak(name) for name in STATED), 2)} or less."
     )
     rows = pd.DataFrame(curves.as_json()["amplitudes"])

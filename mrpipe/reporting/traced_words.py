@@ -77,6 +77,41 @@ def shown_candidates(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: -float(row["share"] or 0.0))
 
 
+def proper_effects(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the named effects, without the flexible model, which has no physical meaning."""
+    return [effect for effect in summary.get("effects", []) if effect["name"] != "unattributed"]
+
+
+def verdict_class(summary: Mapping[str, Any]) -> str:
+    """Return the class of a verdict; runs of older versions do not name it."""
+    if summary.get("verdict_class"):
+        return str(summary["verdict_class"])
+    if not summary["residual"]["structured"]:
+        return "noise"
+    if not proper_effects(summary):
+        return "unknown"
+    return "partly explained" if summary["unexplained"]["structured"] else "explained"
+
+
+def later_effects(summary: Mapping[str, Any]) -> list[str]:
+    """Return the named effects that are not among the candidates.
+
+    Candidates are fitted one at a time. Once the best one is part of the model, the search goes on, and may find an
+    effect that the screening of the first round had left out.
+    """
+    alone = {item["name"] for item in summary.get("candidates") or []}
+    return [effect["name"] for effect in proper_effects(summary) if effect["name"] not in alone]
+
+
+def not_alone_in_words(loop: Mapping[str, Any]) -> str:
+    """Return a sentence on the named effects that the figure of the candidates does not show; empty without any."""
+    later = later_effects(loop)
+    if not later:
+        return ""
+    was = "was" if len(later) == 1 else "were"
+    return f" {listed(later)} {was} found in addition to others and {was} not fitted alone."
+
+
 def shares_in_words(summary: Mapping[str, Any]) -> str:
     """Return what the shares of the candidates are shares of."""
     taken = exchanged_form(summary)

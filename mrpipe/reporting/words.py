@@ -12,7 +12,7 @@ _SCALED = {"m", "N", "s", "N/m", "N*s/m", "N s/m", "m/s", "kg/s", "N*s^2/m^2"}
 
 def percent(value: float | None, digits: int = 2) -> str:
     """Return a ratio as a percentage with some significant digits; `-` where it is not known."""
-    return "-" if value is None else in_percent(value, digits=digits)
+    return in_percent(value, digits=digits)
 
 
 def readable_unit(unit: str) -> str:

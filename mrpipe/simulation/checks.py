@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.effects.damper import require_damper
 from mrpipe.errors import UserError
+from mrpipe.simulation.settings import SimulateSettings
 from mrpipe.structures import Frame
 
 if TYPE_CHECKING:
@@ -25,3 +28,23 @@ def check_loop(frame: Frame, options: LoopOptions) -> None:
         raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
     if np.linalg.matrix_rank(frame.mass) < frame.floors:
         raise UserError(f"frame {frame.name}", "mass", "is singular", "every degree of freedom needs a positive mass")
+
+
+def require_models(settings: SimulateSettings) -> None:
+    """Refuse a damper or a frame of the section `simulate` that is not there, before stages are built for it.
+
+    Raises
+    ------
+    UserError
+        If there is no such artifact, parameter set or file; the message names the setting.
+    """
+    require_damper(settings.damper, "simulate.damper")
+    if settings.frame == "identified":
+        return
+    try:
+        load_parameter_set("frames", settings.frame)
+    except UserError as error:
+        if "no such parameter set" not in error.problem:
+            raise
+        remedy = f"identified, a YAML file, or one of the {error.remedy}"
+        raise UserError("simulate.frame", "", f"no such frame {settings.frame!r}", remedy) from None

@@ -12,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import Excitation, Place
 from mrpipe.structures import Frame
-from mrpipe.structures.given import degree_of_freedom
+from mrpipe.structures.places import degree_of_freedom
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ def measure_resonance(
 def _warnings(curves: Sequence[ResponseCurve], band: tuple[float, float], standard_error: float) -> list[str]:
     found = []
     for curve in curves:
-        level = f"at {curve.base_amplitude_m_s2:.3g} m/s^2"
+        level = f"at {curve.base_amplitude_m_s2:.3g} m/s²"
         if not math.isfinite(curve.peak("rms_x_top_m")):
             found.append(f"{level} the response grows without bound at some frequency; lower the negative stiffness")
             continue

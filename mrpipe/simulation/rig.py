@@ -248,7 +248,7 @@ def _adjusted(
     )
     if error > SETTLED and warn is not None:
         warn(
-            f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s^2 misses it by "
+            f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s² misses it by "
             f"{in_percent(error)}; give simulate.excitation.base_amplitude_m_s2 for another"
         )
     if warn is not None and (implausible := amplitude_warning(amplitude)):
@@ -287,7 +287,7 @@ def record_warning(details: Mapping[str, Any]) -> str:
     if peak <= IMPOSSIBLE_PEAK:
         return ""
     return (
-        f"the recorded ground motion has a peak of {peak:.3g} m/s^2, more than {IMPOSSIBLE_PEAK:.3g} m/s^2 (3 g), "
+        f"the recorded ground motion has a peak of {peak:.3g} m/s², more than {IMPOSSIBLE_PEAK:.3g} m/s² (3 g), "
         "which no recorded ground motion reaches. Check simulate.excitation.file_unit, and simulate.excitation.factor"
     )
 
@@ -297,8 +297,8 @@ def amplitude_warning(amplitude_m_s2: float) -> str:
     if amplitude_m_s2 <= LARGEST_PLAUSIBLE_M_S2:
         return ""
     return (
-        f"the base acceleration that gives the expected motion has an amplitude of {amplitude_m_s2:.3g} m/s^2, "
-        f"more than {LARGEST_PLAUSIBLE_M_S2:.3g} m/s^2, which hardly any ground motion reaches: the damper may be too "
+        f"the base acceleration that gives the expected motion has an amplitude of {amplitude_m_s2:.3g} m/s², "
+        f"more than {LARGEST_PLAUSIBLE_M_S2:.3g} m/s², which hardly any ground motion reaches: the damper may be too "
         "weak for this structure, or may hardly move with the target mode. Give "
         "simulate.excitation.base_amplitude_m_s2, or simulate.excitation.reference_rms_top_m"
     )

@@ -31,7 +31,7 @@ _SUFFIX = {"displacement": "m", "velocity": "m_s", "acceleration": "m_s2", "forc
 _SHOWN = {
     "displacement": (1e3, "mm"),
     "velocity": (1.0, "m/s"),
-    "acceleration": (1.0, "m/s^2"),
+    "acceleration": (1.0, "m/s²"),
     "force": (1.0, "N"),
 }
 

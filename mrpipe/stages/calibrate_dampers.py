@@ -103,10 +103,12 @@ def _together(frame: Frame, found: Sequence[PlacedCalibration]) -> dict[str, Any
 
 
 def _check(settings: Any) -> None:
-    """Check that the laws, gains and models of the dampers are known, before the structure is read."""
+    """Check that the laws, gains, models and places of the dampers are known, before anything is built."""
     from mrpipe.control.laws import law_named
     from mrpipe.control.placed_storage import require_law
     from mrpipe.effects.damper import require_damper
+    from mrpipe.structures.given_storage import read_matrix
+    from mrpipe.structures.named import require_places
 
     require_damper(settings.calibrate.damper, "calibrate.damper", ("identified",))
     for place, entry in enumerate(settings.structure.dampers):
@@ -115,6 +117,7 @@ def _check(settings: Any) -> None:
             require_damper(entry.damper, f"{where}.damper", ("identified",))
         require_law(entry, where)
         law_named(entry.law).require_gains(entry.gains or {}, f"{where}.gains")
+    require_places(settings.structure, read_matrix)
 
 
 VARIANTS = (

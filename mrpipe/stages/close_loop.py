@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.signals.prepared import read_prepared
     from mrpipe.tracing.bench.trace import trace_campaign
     from mrpipe.tracing.bench.verdict.identified import comparison_with_identified
+    from mrpipe.tracing.bench.verdict.not_fitted import own_effects_not_fitted
     from mrpipe.tracing.options import tracing_options
 
     settings = context.settings.close_loop
@@ -56,7 +57,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
-    summary["not_tried"] = _not_fitted(traced, [name for name in library if name not in damper_effects()])
+    summary["not_tried"] = own_effects_not_fitted(traced, library)
     for name, reason in summary["not_tried"].items():
         context.warn(f"{name!r} of close_loop.effect_files was not fitted: {reason}")
     _write(context, traced, summary)
@@ -155,19 +156,6 @@ def _laws(context: StageContext, available: list[str]) -> list[str]:
         if law not in available:
             context.warn(f"law {law} is not compared, because it is not calibrated")
     return laws_to_compare(asked, context.settings.stages, available)
-
-
-def _not_fitted(traced: Tracing, own: Sequence[str]) -> dict[str, str]:
-    """Return name -> reason of the user's effects that the screening left out, so that `candidates` lacks them."""
-    rounds = traced.selection.rounds
-    summary = traced.summary
-    seen = {item.name for candidates in rounds for item in candidates}
-    seen |= {*summary["declared_effects"], *summary["untestable"], *(item["name"] for item in summary["effects"])}
-    reason = (
-        "by the estimate of the screening it explains less of the residual than every effect that was fitted; a larger "
-        "close_loop.refits fits it too"
-    )
-    return {name: reason for name in own if name not in seen} if rounds else {}
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:

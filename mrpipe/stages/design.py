@@ -91,10 +91,12 @@ def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, Dam
 
 
 def _check(settings: Any) -> None:
-    """Check that laws, gains and quantities of the design are known, and its band."""
+    """Check that laws, gains and quantities of the design are known, its band, and that damper and frame are there."""
     from mrpipe.law_design.problem import require_known
+    from mrpipe.simulation.checks import require_models
 
     require_known(settings.design)
+    require_models(settings.simulate)
 
 
 STAGE = Stage(

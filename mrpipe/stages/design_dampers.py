@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.loop_inputs import variant_for_dampers
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.words import in_percent
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
@@ -22,6 +21,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.law_design.run import load_of
     from mrpipe.law_design.several_dampers import design_as_json, design_dampers
     from mrpipe.reporting import several_dampers as report
+    from mrpipe.reporting.design_words import exceeded_limits
     from mrpipe.simulation.inputs import ground_amplitude
     from mrpipe.simulation.several_dampers_rig import dampers_band, dampers_excitation, read_dampers_rig
 
@@ -38,8 +38,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     if found.starts.sentence:
         context.warn(found.starts.sentence)
     summary = design_as_json(rig, found)
-    for name, excess in summary["exceeds_limits"].items():
-        context.warn(f"no design keeps all limits: the best one exceeds that of {name} by {in_percent(excess, 1)}")
+    for line in exceeded_limits(summary["exceeds_limits"]):
+        context.warn(line)
     with context.write("design.h5") as artifact:
         artifact.put_json("design", summary)
     report.describe_design(context.report, summary)

@@ -41,6 +41,7 @@ def export_stage(law: str = "") -> Stage:
         after=("identify-damper", "train-inverse", "reproduce"),
         family="export",
         outputs=tuple(f"{folder}/{name}" for name in FILES),
+        check=_check,
     )
 
 
@@ -50,6 +51,7 @@ def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
     from mrpipe.control.storage import read_calibrated_with
     from mrpipe.effects.damper import damper_named
     from mrpipe.exports.controller import controller_files
+    from mrpipe.exports.replaced import replaced_export
     from mrpipe.reporting import export_controller as section
     from mrpipe.structures.over_amplitude import read_frame_at
 
@@ -70,20 +72,30 @@ def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
         inverse_network(chosen, lambda: context.artifact("train-inverse")),
     )
     built = factory.build(law)
-    details = {"drive_unit": damper.drive_unit, "stroke_m": damper.stroke_m}
-    details["inverse"] = chosen.inverse
+    details: dict[str, Any] = {"drive_unit": damper.drive_unit, "stroke_m": damper.stroke_m}
+    details |= {"inverse": chosen.inverse, "damper": context.settings.simulate.damper}
     folder = context.run_directory / place
+    if replaced := replaced_export(folder, details["damper"]):
+        context.log.warning("%s: %s", context.stage, replaced)
     files = controller_files(built, settings.prefix, details)
     for name, text in files.items():
         atomic_write_text(folder / name, text)
     section.describe(context.report, built, law, place)
     return {
         "law": law,
+        "damper": details["damper"],
         "folder": str(folder),
         "files": list(files),
         "sample_time_s": built.sample_time_s,
         "state_size": built.state_size,
     }
+
+
+def _check(settings: Any) -> None:
+    """Check that the damper is there."""
+    from mrpipe.effects.damper import require_damper
+
+    require_damper(settings.simulate.damper, "simulate.damper")
 
 
 STAGE = export_stage()

@@ -70,16 +70,26 @@ def _network(context: StageContext, name: str) -> Subject:
 
 def _run(context: StageContext, name: str, subject_of: Callable[[StageContext], Subject]) -> Mapping[str, Any]:
     from mrpipe.exports.library import write_export
+    from mrpipe.exports.replaced import replaced_export
     from mrpipe.reporting import export_models as section
 
     subject = subject_of(context)
     for sentence in subject.left_out:
         context.warn(sentence)
     folder = context.run_directory / FOLDER / name
+    if name == "damper" and (replaced := replaced_export(folder, str(subject.details["source"]))):
+        context.log.warning("%s: %s", context.stage, replaced)
     files = write_export(subject, folder, context.settings.export.formats)
     section.describe(context.report, subject, files, f"{FOLDER}/{name}")
     source = {"source": subject.details["source"]} if "source" in subject.details else {}
     return {"kind": subject.kind, "name": subject.name, **source, "folder": str(folder), "files": files}
+
+
+def _check_damper(settings: Any) -> None:
+    """Check that the damper is there."""
+    from mrpipe.effects.damper import require_damper
+
+    require_damper(settings.simulate.damper, "simulate.damper")
 
 
 def _stage(
@@ -89,6 +99,7 @@ def _stage(
     settings: tuple[str, ...] = (),
     conditional_inputs: tuple[tuple[str, str | None, str], ...] = (),
     known_inputs: tuple[str, ...] = (),
+    check: Callable[[Any], None] | None = None,
 ) -> Stage:
     return Stage(
         name=f"export-{name}",
@@ -101,6 +112,7 @@ def _stage(
         after=("reproduce",),
         family="export",
         outputs=(f"{FOLDER}/{name}/vectors.csv", f"{FOLDER}/{name}/README.md"),
+        check=check,
     )
 
 
@@ -116,6 +128,7 @@ STAGES = (
             ("simulate.damper", "traced", "close-loop"),
         ),
         ("close-loop",),
+        _check_damper,
     ),
     _stage(
         "frame",

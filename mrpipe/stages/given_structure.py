@@ -19,6 +19,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.reporting import given_structure as section
     from mrpipe.structures.given import floor_heights, structure_from_settings
     from mrpipe.structures.given_storage import given_summary, read_matrix, write_given
+    from mrpipe.structures.given_units import input_units
     from mrpipe.structures.reduction import reduced_structure
 
     settings = context.settings.structure
@@ -30,7 +31,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             f"({settings.reduction.method}); the largest error of the response to ground motion up to "
             f"{reduced.band_high_hz:.3g} Hz is {in_percent(reduced.error, digits=3)} of the largest response"
         )
-    summary = given_summary(full, reduced, floor_heights(settings, read_matrix))
+    heights = floor_heights(settings, read_matrix)
+    summary = {**given_summary(full, reduced, heights), "input_units": input_units(settings)}
     with context.write("frame.h5") as artifact:
         write_given(artifact, reduced, summary)
     section.describe(context.report, reduced.frame, summary)
@@ -38,13 +40,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 
 def _check(settings: Any) -> None:
-    """Check that the section says where the matrices are."""
+    """Check that the section says where the matrices are, and that the places that it names exist."""
     from mrpipe.errors import UserError
+    from mrpipe.structures.given_storage import read_matrix
+    from mrpipe.structures.named import require_places
 
     if not settings.structure.given:
         problem = "describes a structure, but no file, parameter set, storeys or modes"
         remedy = "give file, frame, storeys, storey_table or mode_shapes, or leave the section out"
         raise UserError("structure", "", problem, remedy)
+    require_places(settings.structure, read_matrix)
 
 
 VARIANTS = (

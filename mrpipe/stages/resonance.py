@@ -22,6 +22,7 @@ def resonance_stage(law: str) -> Stage:
         settings=("gains", "simulate", "resonance"),
         family="resonance",
         outputs=(f"resonance-{law}.h5",),
+        check=_check,
     )
 
 
@@ -50,6 +51,13 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
         artifact.attributes("/", law=law)
     report.describe(context.report, law, curves)
     return {"law": law, **curves.as_json()}
+
+
+def _check(settings: Any) -> None:
+    """Check that damper and frame are there."""
+    from mrpipe.simulation.checks import require_models
+
+    require_models(settings.simulate)
 
 
 STAGES = tuple(resonance_stage(law) for law in law_names())

@@ -23,6 +23,7 @@ def simulate_stage(law: str) -> Stage:
         settings=("gains", "simulate"),
         family="simulate",
         outputs=(f"response-{law}.h5",),
+        check=_check,
     )
 
 
@@ -76,6 +77,13 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
         values["degrees_of_freedom"] = places_table(response, rig.frame.names, excitation)
     details = {"excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
     return {"law": law, **values, **details, "training_range": ranges_as_json(ranges)}
+
+
+def _check(settings: Any) -> None:
+    """Check that damper and frame are there."""
+    from mrpipe.simulation.checks import require_models
+
+    require_models(settings.simulate)
 
 
 STAGES = tuple(simulate_stage(law) for law in law_names())

@@ -21,15 +21,15 @@ from mrpipe.structures.given_checks import (
     tell_of_changed_modes,
     tell_of_equal_matrices,
 )
+from mrpipe.structures.given_units import SI, tell_of_assumed_units, unit_of_column
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
+from mrpipe.structures.places import GROUND
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
-from mrpipe.units import bracketed_units, conversion, same_unit_dimension
+from mrpipe.units import conversion, same_unit_dimension
 from mrpipe.words import counted
 
 Reader = Callable[[Path, str], Any]
 """Function from a file and the name of a variable (empty: the only table) to the content of the variable."""
-
-_GROUND = ("ground", "0")
 
 
 def structure_from_settings(
@@ -87,6 +87,7 @@ def structure_from_settings(
         _names(settings, frame.floors),
         influence_y=_influence("influence_y", settings.influence_y, frame.floors),
     )
+    tell_of_assumed_units(settings, warn)
     tell_of_asymmetric_damping(full.damping, warn)
     complete = without_massless(full, warn)
     require_restoring_forces(complete)
@@ -106,8 +107,8 @@ def _from_storeys(settings: StructureSettings, name: str) -> Frame:
 
 def _from_table(settings: StructureSettings, read: Reader, name: str) -> Frame:
     table = settings.storey_table
-    mass = _column("mass", table.mass, table.file, read, "kg")
-    stiffness = _column("stiffness", table.stiffness, table.file, read, "N/m")
+    mass = _column("mass", table.mass, table.file, read, SI["mass"])
+    stiffness = _column("stiffness", table.stiffness, table.file, read, SI["stiffness"])
     if len(mass) != len(stiffness):
         raise UserError(
             "structure",
@@ -133,17 +134,7 @@ def _column(key: str, column: StoreyColumn, file: str, read: Reader, si: str) ->
     if not np.all(np.isfinite(found)) or np.any(found <= 0.0):
         row = int(np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))[0])
         raise UserError(where, f"storey {row + 1}", f"is {found[row]:g}", "give a positive number for each storey")
-    return found * _factor(_unit_of_column(column, where) or si, si, f"{where}.unit")
-
-
-def _unit_of_column(column: StoreyColumn, where: str) -> str:
-    """Return the unit of a column, which its name may end with in brackets; empty if neither states it."""
-    found = [] if column.values else bracketed_units(column.name)
-    named = found[-1].unit if found and not column.name[found[-1].end :].strip() else ""
-    if column.unit and named and not math.isclose(conversion(column.unit, where=f"{where}.unit"), conversion(named)):
-        problem = f"is {column.unit}, and the column is called {column.name!r}"
-        raise UserError(where, "unit", problem, f"give {named}, or correct the name of the column")
-    return column.unit or named
+    return found * _factor(unit_of_column(column, where) or si, si, f"{where}.unit")
 
 
 def _from_modes(settings: StructureSettings, name: str) -> Frame:
@@ -164,8 +155,8 @@ def _from_modes(settings: StructureSettings, name: str) -> Frame:
 
 
 def _from_matrices(settings: StructureSettings, read: Reader, name: str) -> Frame:
-    mass = _matrix("mass", settings.mass, settings, read, "kg")
-    stiffness = _matrix("stiffness", settings.stiffness, settings, read, "N/m")
+    mass = _matrix("mass", settings.mass, settings, read, SI["mass"])
+    stiffness = _matrix("stiffness", settings.stiffness, settings, read, SI["stiffness"])
     n = mass.shape[0]
     if stiffness.shape != (n, n):
         raise UserError(
@@ -174,7 +165,7 @@ def _from_matrices(settings: StructureSettings, read: Reader, name: str) -> Fram
     mass, stiffness = symmetric("mass", mass), symmetric("stiffness", stiffness)
     require_positive_masses(mass)
     if settings.damping.name or settings.damping.file:
-        damping = _matrix("damping", settings.damping, settings, read, "N*s/m")
+        damping = _matrix("damping", settings.damping, settings, read, SI["damping"])
         if damping.shape != (n, n):
             raise UserError("structure", "damping", f"is {_size(damping)}", f"give a matrix of {n} x {n}")
     else:
@@ -249,7 +240,7 @@ def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
         raise UserError("structure", "degrees_of_freedom", f"{twice} occurs more than once", "give different names")
     for place, name in enumerate(names, start=1):
         where = f"degrees_of_freedom[{place - 1}]"
-        if name in _GROUND:
+        if name in GROUND:
             raise UserError("structure", where, f"is called {name}, which means the ground", "choose another name")
         if name.isdigit() and name != str(place):
             problem = f"is called {name}, which also means the degree of freedom number {name}"
@@ -326,8 +317,8 @@ def floor_heights(settings: StructureSettings, read: Reader) -> list[float] | No
     """Return the height of each floor above the ground [m]; None if a storey has no height."""
     column = settings.storey_table.height
     if settings.storey_table.given and (column.name or column.values):
-        storeys = _column("height", column, settings.storey_table.file, read, "m")
-        floors = _column("mass", settings.storey_table.mass, settings.storey_table.file, read, "kg").size
+        storeys = _column("height", column, settings.storey_table.file, read, SI["height"])
+        floors = _column("mass", settings.storey_table.mass, settings.storey_table.file, read, SI["mass"]).size
         if storeys.size != floors:
             problem = f"has {storeys.size} values, and the table has {floors} storeys"
             raise UserError("structure.storey_table", "height", problem, "give the height of each storey")
@@ -335,49 +326,3 @@ def floor_heights(settings: StructureSettings, read: Reader) -> list[float] | No
     heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
     known = [height for height in heights if height is not None]
     return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None
-
-
-def degree_of_freedom(frame: Frame, name: str | int, where: str = "structure") -> int:
-    """Return the index (from 0) of a degree of freedom given by its name or its number (from 1).
-
-    Raises
-    ------
-    UserError
-        If no such degree of freedom exists.
-    """
-    names = frame.names
-    if str(name) in names:
-        return names.index(str(name))
-    text = str(name)
-    if text.isdigit() and 1 <= int(text) <= frame.floors:
-        return int(text) - 1
-    raise UserError(
-        where, text, "is not a degree of freedom", f"1 to {frame.floors}, or one of {', '.join(names[:12])}"
-    )
-
-
-def device_position(
-    frame: Frame, first: str | int, second: str | int = "ground", where: str = "structure"
-) -> FloatArray:
-    """Return the connectivity vector w, shape (n,), of a device between two degrees of freedom, or one and ground.
-
-    The displacement of the device is w'x = x_first - x_second; the first or the second may be the ground.
-
-    Raises
-    ------
-    UserError
-        If a degree of freedom is unknown, or both ends are the same.
-    """
-    if str(first) in _GROUND and str(second) in _GROUND:
-        raise UserError(where, f"{first} to {second}", "connects the ground to itself", "give a degree of freedom")
-    if str(first) in _GROUND:
-        first, second = second, first
-    w = np.zeros(frame.floors)
-    w[degree_of_freedom(frame, first, where)] = 1.0
-    if str(second) not in _GROUND:
-        w[degree_of_freedom(frame, second, where)] -= 1.0
-    if not np.any(w):
-        raise UserError(
-            where, f"{first} to {second}", "connects a degree of freedom to itself", "give two different ones"
-        )
-    return w

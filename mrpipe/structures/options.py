@@ -29,7 +29,11 @@ class StoreyColumn(Section):
 
     name: str = Field("", description="Column in `storey_table.file`.")
     values: tuple[float, ...] = Field((), description="Values, lowest storey first, if there is no file.")
-    unit: str = Field("", description="Unit, such as t, kip*s^2/in, kN/mm, ft; empty: SI.")
+    unit: str = Field(
+        "",
+        description="Unit, such as t, kip*s^2/in, kN/mm, ft; empty: that in the name of the column, else SI, which a "
+        "warning states.",
+    )
 
 
 class StoreyTable(Section):
@@ -53,7 +57,7 @@ class MatrixEntry(Section):
     name: str = Field(
         "", description="Variable in the file, such as M or model.K; empty for a CSV file that holds this matrix only."
     )
-    unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI.")
+    unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI, which a warning states.")
 
 
 class DamperSettings(Section):
@@ -123,8 +127,8 @@ class StructureSettings(Section):
         "",
         description="File of the matrices (.mat, .csv, .h5, .json), or an openseespy script (.py), which is run.",
     )
-    mass: MatrixEntry = Field(MatrixEntry(name="M", unit="kg"), description="Mass matrix.")
-    stiffness: MatrixEntry = Field(MatrixEntry(name="K", unit="N/m"), description="Stiffness matrix.")
+    mass: MatrixEntry = Field(MatrixEntry(name="M"), description="Mass matrix.")
+    stiffness: MatrixEntry = Field(MatrixEntry(name="K"), description="Stiffness matrix.")
     damping: MatrixEntry = Field(
         MatrixEntry(), description="Damping matrix; without a name and a file: modal damping by `damping_ratio`."
     )

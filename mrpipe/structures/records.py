@@ -358,5 +358,5 @@ def _check_peaks(path: Path, values: FloatArray, unit: str) -> None:
     if moving.max() > 50.0 * moving.min():
         largest = ", ".join(f"{peak:.3g}" for peak in peaks)
         raise UserError(
-            path, "components", f"peaks {largest} m/s^2 differ too much: mixed units", "use one unit for all"
+            path, "components", f"peaks {largest} m/s² differ too much: mixed units", "use one unit for all"
         )

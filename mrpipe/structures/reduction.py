@@ -17,8 +17,8 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import StateSpace, natural_modes, state_space
 from mrpipe.structures.frame import Frame
-from mrpipe.structures.given import degree_of_freedom
 from mrpipe.structures.options import ReductionSettings
+from mrpipe.structures.places import degree_of_freedom
 
 WORST_CONDITION = 1e6
 """Shapes at the places to keep with a larger condition number do not determine the amplitudes of the modes."""

@@ -108,7 +108,7 @@ def _kalman() -> Outcomes:
     return {
         "A12e": Value([abs(printed), -np.angle(printed)], "transfer function of (5.3) as printed"),
         "A12f": Value(error, "discrete Kalman filter on sinusoidal motion"),
-        "D1": Value([k, gain], "noise of 20 um and 0.1 m/s^2"),
+        "D1": Value([k, gain], "noise of 20 um and 0.1 m/s²"),
     }
 
 
@@ -147,7 +147,7 @@ def _tables(bench: Bench) -> Outcomes:
     # the viscous damper of P3 is not an MR damper: its force is c times the true velocity at every instant
     linear = replace(rig, options=replace(rig.options, tracking="continuous", noise=SensorNoise()))
     peaks["viscous"] = cycle_peaks(run_law(linear, "vd", excite(amplitude), bench.seed))
-    by = f"closed loop of {bench.source} at {OMEGA:g} rad/s and {amplitude:.3f} m/s^2"
+    by = f"closed loop of {bench.source} at {OMEGA:g} rad/s and {amplitude:.3f} m/s²"
     found: Outcomes = {}
     for part, table in (("T4.1", "Table 4.1"), ("P3-T1", "P3 Table 1")):
         for law, rows in printed_columns(table, part).items():

@@ -72,7 +72,7 @@ def _measured(case: Case) -> Outcomes:
     """Return the measured column: the loop at the resonance of each law."""
     found: Outcomes = {}
     for law in LAWS:
-        by = f"{case.name}: {case.omega[law]:.2f} rad/s, {case.base_amplitude_m_s2:.3f} m/s^2"
+        by = f"{case.name}: {case.omega[law]:.2f} rad/s, {case.base_amplitude_m_s2:.3f} m/s²"
         found[table_id("T5.1m", law, _DAMPING)] = _number(case.damping[law].fit, by, _damping_words(case, law))
         for row in INDICES:
             found[table_id("T5.1m", law, row)] = _number(case.values[law][row], by)
@@ -138,7 +138,7 @@ def _findings(bench: Bench, cases: Mapping[str, Case]) -> Outcomes:
 
 
 def _flat_minima(bench: Bench, amplitude: float) -> Outcomes:
-    by = f"peaks over frequency at {amplitude:.3f} m/s^2, {bench.source}"
+    by = f"peaks over frequency at {amplitude:.3f} m/s², {bench.source}"
     found: Outcomes = {}
     for name, law, gain, values in (
         ("R5-c", "vd", "c_n_s_m", C_VALUES),

@@ -6,6 +6,7 @@ import sys
 
 from mrpipe.thesis.claim import rule_text
 from mrpipe.thesis.entries import KINDS, Entry, Kind, all_entries, tables
+from mrpipe.words import in_percent
 
 _HEAD = """\
 # The ledger of the thesis
@@ -79,7 +80,7 @@ def _row(entry: Entry) -> str:
     else:
         shown = entry.printed if isinstance(entry.printed, str) else f"{entry.printed:.4g}"
     if entry.tolerance:
-        shown += f" within {100.0 * entry.tolerance:.2g} %"
+        shown += f" within {in_percent(entry.tolerance, digits=3, exact=True)}"
     cells = (entry.id, entry.what, entry.place, shown)
     return "| " + " | ".join(str(cell).replace("|", chr(92) + "|") for cell in cells) + " |\n"
 

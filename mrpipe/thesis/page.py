@@ -17,6 +17,7 @@ from mrpipe.thesis.collect import Ledger
 from mrpipe.thesis.entries import KINDS, Kind, tables
 from mrpipe.thesis.table51_page import describe as describe_table_5_1
 from mrpipe.thesis.table51_page import markdown as table_5_1_markdown
+from mrpipe.words import in_percent
 
 VERDICTS: tuple[Verdict, ...] = ("holds", "differs", "cannot-be-recomputed")
 _SMALLEST = 1e-7
@@ -75,7 +76,9 @@ def rows(claims: Sequence[Claim]) -> list[dict[str, Any]]:
             "printed in": claim.entry.place,
             "printed": shown(claim.printed),
             "recomputed": shown(claim.recomputed),
-            "tolerance": "" if claim.entry.tolerance is None else f"{100 * claim.entry.tolerance:.3g} %",
+            "tolerance": ""
+            if claim.entry.tolerance is None
+            else in_percent(claim.entry.tolerance, digits=3, exact=True),
             "verdict": claim.verdict,
             "by": claim.by,
             "why": claim.why,

@@ -29,8 +29,8 @@ from mrpipe.words import in_percent
 _AXES = {
     "rms_x5_m": ("rms x5 [mm]", 1e3),
     "rms_x1_m": ("rms x1 [mm]", 1e3),
-    "rms_a5_m_s2": ("rms a5 [m/s^2]", 1.0),
-    "rms_a1_m_s2": ("rms a1 [m/s^2]", 1.0),
+    "rms_a5_m_s2": ("rms a5 [m/s²]", 1.0),
+    "rms_a1_m_s2": ("rms a1 [m/s²]", 1.0),
 }
 _SIMULATED = (f"{PERFECT}, {AT_ONE}", f"{PRINTED_DAMPER}, {AT_ONE}", f"{PLAIN}, {AT_ONE}")
 _MEASURED = tuple(f"{damper}, {where}" for damper in (PLAIN, TRACED) for where in (AT_ONE, AT_VD, AT_OWN))

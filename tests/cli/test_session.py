@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mrpipe.cli import run
 from mrpipe.cli.options import CommonOptions
 from mrpipe.cli.session import load, session
 from mrpipe.errors import UserError
@@ -100,3 +101,24 @@ def test_an_unknown_stage_is_named_with_its_line(tmp_path: Path) -> None:
     said = r"own.yaml: line 4, stages\[1\]: no such stage 'trian-forward'; did you mean train-forward"
     with pytest.raises(UserError, match=said), session(CommonOptions(config=config, run=tmp_path / "run")):
         pass
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("what", ["inverse", "damper", "frame", "controller", "all"])
+def test_an_export_without_data_changes_nothing(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "own.yaml"
+    config.write_text("name: own\ncampaigns: {bench: null, frame: null, closed_loop: null}\n", encoding="utf-8")
+    command = ["export", what, "--config", str(config), "--run", str(tmp_path / "new" / "run")]
+    assert run(command) == 2
+    assert "line 2, campaigns." in (said := capsys.readouterr().err) and "is null, and export-" in said
+    assert not (tmp_path / "new").exists()
+    # results of an earlier run in the same directory, with another configuration, are kept
+    results = tmp_path / "new" / "run"
+    (results / "manifests").mkdir(parents=True)
+    for name in ("prepared.h5", "training.h5", "inverse.h5", "damper.h5", "frame.h5"):
+        (results / name).write_text("a result", encoding="utf-8")
+    (results / "config.yaml").write_text("name: earlier\n", encoding="utf-8")
+    assert run(command) == 2
+    kept = {path.name: path.read_text(encoding="utf-8") for path in results.glob("*.h5")}
+    assert len(kept) == 5 and set(kept.values()) == {"a result"}
+    assert (results / "config.yaml").read_text(encoding="utf-8") == "name: earlier\n"

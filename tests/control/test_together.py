@@ -14,7 +14,7 @@ from mrpipe.control.placed import PlacedDamper, calibrate_placed, modes_together
 from mrpipe.control.together import LinearDevice, damping_together, ground_response, linear_device
 from mrpipe.errors import UserError
 from mrpipe.structures import complex_modes, frequency_response, shear_frame
-from mrpipe.structures.given import device_position
+from mrpipe.structures.places import device_position
 
 FRAME = shear_frame([20.0] * 4, [3.0e4] * 4, np.full(4, 0.01), name="four storeys", source="test")
 FIRST, BETWEEN = device_position(FRAME, 1), device_position(FRAME, 3, 2)
@@ -65,6 +65,18 @@ def test_a_dashpot_behind_its_brace_moves_less_than_both_together() -> None:
     np.testing.assert_allclose(floors, found[:4], rtol=1e-9)
     np.testing.assert_allclose(strokes, [FIRST @ found[:4], found[4]], rtol=1e-9)
     assert abs(strokes[1]) < 0.99 * abs(BETWEEN @ floors)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("zeta", [0.4, 1.0, 1.5, 3.0])
+def test_the_effective_damping_ratio_falls_beyond_critical_damping(zeta: float) -> None:
+    """The poles of x'' + 2 zeta w x' + w^2 x are w (-zeta +- sqrt(zeta^2 - 1))."""
+    mass, stiffness = 20.0, 3.0e4
+    frame = shear_frame([mass], [stiffness], np.zeros(1), name="one storey", source="test")
+    found = damping_together(frame, [LinearDevice(np.ones(1), 2.0 * zeta * math.sqrt(mass * stiffness))], [1])
+    expected = zeta if zeta < 1.0 else zeta - math.sqrt(zeta**2 - 1.0)
+    assert found.effective_ratios[0] == pytest.approx(expected, rel=1e-6)
+    assert found.damping_ratios[0] == pytest.approx(min(zeta, 1.0), rel=1e-6)
 
 
 @pytest.mark.property

@@ -190,5 +190,5 @@ def test_wind_acts_on_degrees_of_freedom(tmp_path: Path, plant: Plant, rig: Rig)
     np.testing.assert_array_equal(place.shape, [0.0, 0.0, 0.0, 0.5, 1.0])
     response = rig.run(rig.controller("vd"), excitation)
     assert np.ptp(response.displacement[:, -1]) > 0.0
-    with pytest.raises(UserError, match=r"design\.motions\[0\]\.force_at: floor 9: is not a degree of freedom"):
+    with pytest.raises(UserError, match=r"design\.motions\[0\]\.force_at: 'floor 9' is not a degree of freedom"):
         load_of(DesignSettings(motions=(wind.changed(force_at={"floor 9": 1.0}),)), 0.79, (7.0, 9.0), plant.frame)

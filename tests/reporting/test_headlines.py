@@ -62,7 +62,7 @@ def test_an_exchanged_base_form_without_effects_is_in_the_line() -> None:
 def test_a_relative_acceleration_is_called_relative() -> None:
     """The table of the laws has absolute accelerations, so the two must not share a name."""
     summary = {"rms_x_top_m": 0.0243, "rms_x1_m": 0.00617, "rms_a1_m_s2": 0.816, "damping_ratio": 0.127}
-    assert "a1 0.816 m/s2 relative to the ground" in headline("simulate-vd", summary)
+    assert "a1 0.816 m/s² relative to the ground" in headline("simulate-vd", summary)
 
 
 @pytest.mark.property

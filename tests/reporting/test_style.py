@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import mrpipe
 from mrpipe.reporting.style import MOST_POINTS, as_svg, figure_with_axes
 
 
@@ -37,3 +40,26 @@ def test_texts_of_a_figure_keep_their_digits() -> None:
     assert {"0.001", "0.002", "0.003", "NRMSE 0.0046 after, test 3a-1.125Hz"} <= set(texts)
     # the coordinates are still short, because they are most of the file
     assert not re.search(r"\d\.\d{3}", "".join(re.findall(r"<path[^>]*>", drawing)))
+
+
+@pytest.mark.property
+def test_accelerations_have_one_unit_in_tables_figures_and_text() -> None:
+    package = Path(mrpipe.__file__).parent
+    files = [
+        *package.glob("reporting/**/*.py"),
+        *package.glob("case_studies/**/report.py"),
+        *package.glob("thesis/*page.py"),
+        package / "cli" / "output.py",
+    ]
+    found = []
+    for path in files:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        found += [
+            f"{path.name}:{node.lineno}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant)
+            and id(node) not in documentation
+            and re.search(r"m/s(\^2|2)", str(node.value))
+        ]
+    assert not found, "write m/s², as all other tables do"

@@ -106,7 +106,7 @@ def test_settings_and_what_can_be_wrong(tmp_path: Path) -> None:
         acting(excitation_at(ground, 5.0, 0.0), ground, frame).at(TIME), 9.80665 * HISTORIES[:, 1]
     )
     for changes, words in (
-        ({"force_at": {"deck z": 1}}, "deck z: is not a degree of freedom"),
+        ({"force_at": {"deck z": 1}}, "'deck z' is not a degree of freedom"),
         ({"force_at": {1: 1, 2: 1, 3: 1}}, "names 3 degrees of freedom, but the file holds 2 histories"),
         ({"force_at": {}}, "is not a unit of acceleration"),
         ({"file_channels": (3,)}, "channel 3: is not in the record"),
@@ -155,7 +155,7 @@ def test_a_force_and_ground_motion_act_together(tmp_path: Path) -> None:
         ),
         ({"base_amplitude_m_s2": 1.0, "direction_deg": 3.0}, r"also\[0\]: direction_deg"),
         ({"kind": "recorded", "file": "none.csv"}, r"also\[0\].file: none.csv: there is no such file"),
-        ({"force_amplitude_n": 1.0, "force_at": {"roof": 1.0}}, r"also\[0\].force_at: roof"),
+        ({"force_amplitude_n": 1.0, "force_at": {"roof": 1.0}}, r"also\[0\].force_at: 'roof'"),
     ],
 )
 def test_mistakes_in_what_acts_in_addition(further: dict, words: str) -> None:

@@ -20,10 +20,11 @@ from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.several_dampers import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, shear_frame
-from mrpipe.structures.given import device_position, structure_from_settings
+from mrpipe.structures.given import structure_from_settings
 from mrpipe.structures.given_storage import read_matrix
 from mrpipe.structures.opensees import ViscousDevice, opensees_matrices, opensees_script
 from mrpipe.structures.options import MatrixEntry, StructureSettings
+from mrpipe.structures.places import device_position
 
 needs_opensees = pytest.mark.skipif(
     importlib.util.find_spec("openseespy") is None, reason="openseespy is not installed (pip install 'mrpipe[oracle]')"

@@ -56,7 +56,7 @@ def test_a_peak_at_the_edge_and_growth_without_bound_are_warned_of(monkeypatch: 
     found = _measured(monkeypatch, {0.8: [0.1, 0.2, 0.3], 1.6: [0.1, np.inf, 0.3]}, settings)
     edge, growth = found.warnings
     assert "at the edge of the band, 10 rad/s; widen resonance.band_rad_s (6 to 10)" in edge
-    assert "at 1.6 m/s^2 the response grows without bound" in growth
+    assert "at 1.6 m/s² the response grows without bound" in growth
 
 
 def test_a_largest_value_that_is_not_known_accurately_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.several_dampers import LoopDamper, _noise, simulate_dampers
 from mrpipe.simulation.windows import QUANTITIES, values_between
 from mrpipe.structures import shear_frame
-from mrpipe.structures.given import device_position
+from mrpipe.structures.places import device_position
 from mrpipe.structures.response import linear_response
 
 FRAME = shear_frame([25.0] * 3, [3.0e4] * 3, np.full(3, 0.01), name="three storeys", source="test")

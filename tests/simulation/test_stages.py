@@ -398,7 +398,7 @@ def test_a_law_without_a_force_is_skipped_with_a_perfect_damper(run, stage):
 def test_an_implausible_base_amplitude_is_reported() -> None:
     assert amplitude_warning(0.8) == ""
     said = amplitude_warning(18.0)
-    assert "an amplitude of 18 m/s^2, more than 9.81 m/s^2" in said
+    assert "an amplitude of 18 m/s², more than 9.81 m/s²" in said
     assert "simulate.excitation.base_amplitude_m_s2" in said
 
 
@@ -407,7 +407,7 @@ def test_a_record_in_the_wrong_unit_is_reported() -> None:
     """A record in cm/s^2 without a header, read as m/s^2, has peaks of tens of g."""
     assert record_warning({"kind": "recorded", "peak_m_s2": 12.0}) == record_warning({"peak_n": 3.0e4}) == ""
     said = record_warning({"kind": "recorded", "peak_m_s2": 152.0})
-    assert "has a peak of 152 m/s^2, more than 29.4 m/s^2 (3 g)" in said
+    assert "has a peak of 152 m/s², more than 29.4 m/s² (3 g)" in said
     assert "simulate.excitation.file_unit" in said
 
 

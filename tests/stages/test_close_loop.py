@@ -217,18 +217,6 @@ def test_every_law_runs_before_after_and_recalibrated(
 
 
 @pytest.mark.property
-def test_an_effect_of_the_user_that_the_screening_leaves_out_is_named(traced: Tracing) -> None:
-    fitted = [item.name for item in traced.selection.rounds[0]]
-    known = replace(traced, summary={**traced.summary, "untestable": {"slow": "no long test"}})
-    found = close_loop._not_fitted(known, [*fitted, "slow", "own"])
-    assert list(found) == ["own"]
-    assert "less of the residual than every effect that was fitted" in found["own"]
-    # without a residual nothing is fitted, and no effect is left out
-    clean = replace(traced, selection=replace(traced.selection, rounds=()))
-    assert close_loop._not_fitted(clean, ["own"]) == {}
-
-
-@pytest.mark.property
 def test_without_a_frame_the_closed_loop_is_skipped(tmp_path: Path, tests: list[PreparedTest], traced: Tracing) -> None:
     found = closed_loop(context(tmp_path, {}), traced, tests)
     assert found == {"status": "skipped: there is no identified frame and no calibrated law"}

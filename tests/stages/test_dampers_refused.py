@@ -30,6 +30,12 @@ MISTAKES: dict[str, tuple[int, dict[str, Any], str]] = {
         {"damper": "set-d"},
         "structure.dampers[0].damper: no such damper 'set-d'; identified, a file, or one",
     ),
+    "place": (
+        1,
+        {"between": [2, "roof"]},
+        "structure.dampers[1].between: 'roof' is not a degree of freedom; 1 to 3, or one of floor 1, floor 2, floor 3",
+    ),
+    "same place": (0, {"between": [1, "floor 1"]}, "structure.dampers[0].between, 1 to floor 1: connects a degree of"),
     "artifact": (0, {"damper": "no.h5"}, "structure.dampers[0].damper: no such artifact no.h5; name an existing file"),
 }
 
@@ -63,7 +69,7 @@ def test_a_wrong_damper_is_named_with_its_line(
     first = next(number for number, line in enumerate(lines, 1) if line.endswith(f"name: {DAMPERS[place]['name']}"))
     key = next(iter(change["gains"])) if key == "gains" else key
     wanted = next(number for number, line in enumerate(lines, 1) if number > first and line.strip().startswith(key))
-    for command in ("check", "calibrate"):
+    for command in ("check", "calibrate", "simulate", "design"):
         error = _refused(tmp_path, content, command, capsys)
         assert f"line {wanted}, {said}" in error
 
@@ -114,3 +120,31 @@ def test_wrong_settings_of_the_design_are_named_before_anything_is_built(
     content = {"name": "own", "design": setting, **rest}
     for command in ("check", "run", "design"):
         assert said in _refused(tmp_path, content, command, capsys)
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ({"damper": "set-d"}, "line 2, simulate.damper: no such damper 'set-d'; identified, traced, a file, or one of"),
+        ({"damper": "no.h5"}, "line 2, simulate.damper: no such artifact no.h5; name an existing file, or identified"),
+        ({"frame": "tower"}, "line 2, simulate.frame: no such frame 'tower'; identified, a YAML file, or one of"),
+    ],
+)
+def test_an_unknown_damper_or_frame_of_the_loop_is_named_before_anything_is_built(
+    setting: dict[str, Any], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rest = _content(**STOREYS) | {"stages": ["identify-frame", "calibrate", "simulate-vd", "resonance-vd", "design"]}
+    content = {"simulate": {"damper": "set-c", **setting, "controller": {"inverse": "model"}}, **rest}
+    commands = [["check"], ["run"], ["simulate", "--law", "vd"], ["simulate", "--law", "vd", "--resonance"], ["design"]]
+    if "damper" in setting:
+        commands += [["export", "damper"], ["export", "controller"], ["export", "controller", "--law", "vd"]]
+    config = tmp_path / "own.yaml"
+    # the changed key is in the second line of the file
+    lines = yaml.safe_dump({"simulate": setting}, sort_keys=False)
+    content["simulate"] = {key: value for key, value in content["simulate"].items() if key not in setting}
+    rest_of_loop = "".join(f"  {line}\n" for line in yaml.safe_dump(content.pop("simulate")).splitlines())
+    config.write_text(lines + rest_of_loop + yaml.safe_dump(content, sort_keys=False))
+    for command in commands:
+        assert run([*command, "--config", str(config), "--run", str(tmp_path / "run")]) == 2
+        assert said in capsys.readouterr().err, command
+        assert not (tmp_path / "run").exists()

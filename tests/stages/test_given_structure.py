@@ -256,4 +256,4 @@ def test_everything_is_exported_for_which_there_are_data(tmp_path: Path, capsys:
     assert {"export-damper", "export-frame", "export-controller"} <= set(json.loads(printed.out))
     assert "export-forward is left out: " in printed.err and "export-inverse is left out: " in printed.err
     assert run(["export", "forward", *common, *given, "--quiet"]) == 2
-    assert "export-forward: cannot run: " in capsys.readouterr().err
+    assert "campaigns.bench: is null, and export-forward reads a bench campaign; " in capsys.readouterr().err

@@ -13,9 +13,10 @@ from scipy.sparse import csc_matrix
 
 from mrpipe.errors import UserError
 from mrpipe.structures import natural_modes, shear_frame
-from mrpipe.structures.given import degree_of_freedom, device_position, floor_heights, structure_from_settings
+from mrpipe.structures.given import floor_heights, structure_from_settings
 from mrpipe.structures.given_storage import read_matrix
 from mrpipe.structures.options import MatrixEntry, Storey, StoreyColumn, StoreyTable, StructureSettings
+from mrpipe.structures.places import degree_of_freedom, device_position
 
 FRAME = shear_frame([2.0, 3.0, 1.0], [500.0, 400.0, 300.0], 0.02)
 
@@ -25,7 +26,12 @@ def reader(content: dict[str, Any]):  # type: ignore[no-untyped-def]
 
 
 def settings(**changes: Any) -> StructureSettings:
-    given: dict[str, Any] = {"file": "model.mat", "damping": MatrixEntry(name="C")}
+    given: dict[str, Any] = {
+        "file": "model.mat",
+        "mass": MatrixEntry(name="M", unit="kg"),
+        "stiffness": MatrixEntry(name="K", unit="N/m"),
+        "damping": MatrixEntry(name="C", unit="N*s/m"),
+    }
     return StructureSettings(**{**given, **changes})
 
 

@@ -150,7 +150,7 @@ def _histories(sink: Sink, result: IsolationResult) -> None:
         curves = {case.law: _top(result, case.response, axis) for case in result.cases}
         free = _top(result, result.uncontrolled, axis)
         for place, (quantity, word) in enumerate(
-            (("top floor acceleration [m/s^2]", "acceleration"), ("top floor displacement [m]", "displacement"))
+            (("top floor acceleration [m/s²]", "acceleration"), ("top floor displacement [m]", "displacement"))
         ):
             picture = figures.histories(
                 time, {law: values[place] for law, values in curves.items()}, free[place], quantity=quantity
@@ -174,7 +174,7 @@ def _histories(sink: Sink, result: IsolationResult) -> None:
         clock,
         {"y": components[:, 1]},
         components[:, 0],
-        quantity="ground acceleration [m/s^2]",
+        quantity="ground acceleration [m/s²]",
         title=result.motion.name,
         reference_name="x",
     )

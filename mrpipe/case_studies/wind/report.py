@@ -100,7 +100,7 @@ def describe(sink: Sink, result: WindResult, printed: figures.Table) -> None:
     histories = {case.law: wind_response(case.response) for case in result.cases}
     time = study.uncontrolled.time_s
     until = min(300.0, study.load.duration_s)
-    for name, place, unit in (("displacement_m", 8, "x76 [m]"), ("acceleration_m_s2", 7, "a75 [m/s^2]")):
+    for name, place, unit in (("displacement_m", 8, "x76 [m]"), ("acceleration_m_s2", 7, "a75 [m/s²]")):
         picture = figures.histories(
             time,
             {law: getattr(item, name)[:, place] for law, item in histories.items()},

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.modal.amplitude.laws import AmplitudeModel
+from mrpipe.words import in_percent
 
 _LARGEST_SHARE = 0.5
 """Squared error that a law may leave, over the squared response and over the squared error of constant modes."""
@@ -54,11 +55,12 @@ def amplitude_finding(result: AmplitudeDependence) -> str:
     low, high = model.laws.at(model.smallest_m), model.laws.at(model.largest_m)
     mode = int(np.argmax(np.abs(high[0] / low[0] - 1.0)))
     seen = (
-        f"{omega[mode] / (2 * np.pi):.4g} Hz and {100 * zeta[mode]:.2g} % damping at {1e3 * reached[mode]:.2g} mm"
+        f"{omega[mode] / (2 * np.pi):.4g} Hz and {in_percent(zeta[mode], digits=2)} damping "
+        f"at {1e3 * reached[mode]:.2g} mm"
         for (omega, zeta), reached in ((low, model.smallest_m), (high, model.largest_m))
     )
-    before, after = (100.0 * np.sqrt(np.mean(values)) for values in (result.constant_error, result.error))
+    before, after = (float(np.sqrt(np.mean(values))) for values in (result.constant_error, result.error))
     return (
         f"modes depend on the amplitude: mode {mode + 1} from {' to '.join(seen)}; on data left out of the fit the RMS "
-        f"error falls from {before:.0f} to {after:.0f} % of the response"
+        f"error falls from {100.0 * before:.0f} to {in_percent(after)} of the response"
     )

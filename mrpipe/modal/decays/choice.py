@@ -10,7 +10,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.modal.decays.decay import DecayMethod, DecayResult, Estimate, analyse_decay
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests, Place
-from mrpipe.words import listed, noun
+from mrpipe.words import in_percent, listed, noun
 
 _NORMAL_95 = 1.959964
 LONGER_RECORDS = "; longer records, or more force on this mode, would reduce this interval"
@@ -105,9 +105,9 @@ def choose_damping(
             chosen.append(pooled(first, second))
             sources.append(f"decay and {other}")
         if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
-            percent = 100.0 * chosen[-1].half_width / chosen[-1].value
+            width = in_percent(chosen[-1].half_width / chosen[-1].value)
             findings.append(
-                f"mode {mode}: the records determine the damping ratio only within +-{percent:.0f} % (95 % interval)"
+                f"mode {mode}: the records determine the damping ratio only within +-{width} (95 % interval)"
                 f"{LONGER_RECORDS}"
             )
         if first is not None:

@@ -15,7 +15,7 @@ from mrpipe.modal.matrices.tridiagonal import TridiagonalFit, fit_partial, store
 from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel
 from mrpipe.modal.search.selection import Layout
 from mrpipe.structures import Frame, frame_from_modes, modal_damping_matrix, natural_modes, normalise_to_largest
-from mrpipe.words import noun
+from mrpipe.words import in_percent, noun
 
 _MODEL_ERROR = 0.02
 """Relative frequency error of the storey model above which the user is warned."""
@@ -243,7 +243,7 @@ def storey_model_findings(storeys: TridiagonalFit, numbers: Sequence[int], inste
     mode = numbers[int(np.argmax(error))]
     return [
         f"with springs between neighbouring floors alone the frequency of mode {mode} differs by "
-        f"{100.0 * error.max():.1f} %; {instead}"
+        f"{in_percent(error.max(), 1)}; {instead}"
     ]
 
 

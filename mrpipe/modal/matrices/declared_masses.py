@@ -18,6 +18,7 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.matrices.masses import NORMAL_95, FloorMasses
 from mrpipe.modal.matrices.scaling import Scale, masses_of
 from mrpipe.modal.search.selection import Layout, all_floors_measured
+from mrpipe.words import in_percent
 
 _LEVEL = 0.01
 """Probability of a finding on masses that are right, over all floors of a structure."""
@@ -143,11 +144,11 @@ def _gain(fit: MultiModeFit, layout: Layout, row: int) -> float:
 
 def _floor_text(row: int, ratios: _Ratios, gain: float) -> str:
     value, spread = float(ratios.values[row]), float(ratios.spread[row])
-    percent = f"{100.0 * value:.1f} % (+-{100.0 * spread * value:.1f} %)"
+    percent = f"{in_percent(value, 1)} (+-{in_percent(spread * value, 1)})"
     seen = f"floor {row + 1}: the orthogonality of the modes gives {percent}"
     apparent = float(1.0 / np.sqrt(value))
     mass = f"the declared mass is {1.0 / value:.3g} times the true one"
-    reads = f"its sensor reads {100.0 * apparent:.0f} % of the motion"
+    reads = f"its sensor reads {in_percent(apparent)} of the motion"
     limit = float(ratios.limit[row])
     if np.isfinite(gain) and gain > 0.0:
         # the gain counts twice in the ratio
@@ -162,6 +163,6 @@ def _common_text(common: _Ratios, scale: Scale) -> str:
     value, spread = float(common.values[0]), float(common.spread[0])
     what = "the force or its unit" if scale.source == "the measured force" else "the added masses"
     return (
-        f"floor masses: {scale.source} gives {100.0 * value:.1f} % (+-{100.0 * spread * value:.1f} %) of the declared "
-        f"masses of all floors: the declared masses, {what}, or the unit of the sensors has a wrong factor"
+        f"floor masses: {scale.source} gives {in_percent(value, 1)} (+-{in_percent(spread * value, 1)}) of the "
+        f"declared masses of all floors: the declared masses, {what}, or the unit of the sensors has a wrong factor"
     )

@@ -20,6 +20,7 @@ from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search.checks import orthogonal_shapes
 from mrpipe.structures import Frame, modal_damping_matrix, normalise_to_largest
 from mrpipe.structures.response import band_limited_response
+from mrpipe.words import in_percent
 
 AXES = ("x", "y", "rotation")
 _LARGEST_MISFIT = 0.1
@@ -158,7 +159,7 @@ def assemble_rigid(
         Direction of the ground motion for the influence vector of the frame.
     """
     findings = [
-        f"mode {mode + 1}: {100.0 * share:.0f} % of the shape does not fit rigid floors (check positions and signs)"
+        f"mode {mode + 1}: {in_percent(share)} of the shape does not fit rigid floors (check positions and signs)"
         for mode, share in enumerate(rigid.misfit)
         if share > _LARGEST_MISFIT
     ]

@@ -18,6 +18,7 @@ from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.chosen_tests import choose_tests, with_clocks
 from mrpipe.modal.search.selection import Layout, all_floors_measured, floor_shapes, shape_errors
+from mrpipe.words import in_percent
 
 _USUAL_FORCE_ERROR = 0.02
 
@@ -127,8 +128,8 @@ def _compared(fit: MultiModeFit, layout: Layout, scale: Scale) -> list[str]:
     ratio = float(np.exp(weight @ np.log(own[known] / scale.residues[known]) / weight.sum()))
     error = float(1.0 / np.sqrt(weight.sum()))
     return [
-        f"check of the floor masses: the added masses give {100.0 * ratio:.1f} % of the given ones "
-        f"(standard error {100.0 * error:.1f} %)"
+        f"check of the floor masses: the added masses give {in_percent(ratio, 1)} of the given ones "
+        f"(standard error {in_percent(error, 1)})"
     ]
 
 

@@ -18,7 +18,7 @@ from mrpipe.modal.fit.covariance import clustered_covariance
 from mrpipe.modal.fit.information import weighted
 from mrpipe.modal.fit.multimode import collected, fitted_poles
 from mrpipe.modal.fit.result import MultiModeFit
-from mrpipe.words import listed
+from mrpipe.words import in_percent, listed
 
 _LEVEL = 1e-3
 """Probability that tests of one structure are found to differ, over all modes."""
@@ -179,13 +179,18 @@ def difference(names: Sequence[str], poles: PolesOfTests, odd: Sequence[int] | N
     most = poles.deviations(every)
     mode = int(np.argmax(most.max(axis=0)))
     values = poles.values[:, mode]
-    zeta = 100.0 * np.exp(poles.values[:, poles.modes + mode])
+    zeta = np.exp(poles.values[:, poles.modes + mode])
     if odd:
         rest = [test for test in every if test not in odd]
         usual = float(np.exp(np.median(values[rest])))
-        who = listed([f"{names[test]} ({100.0 * (np.exp(values[test]) / usual - 1.0):+.2f} %)" for test in odd])
+        who = listed(
+            [f"{names[test]} ({in_percent(np.exp(values[test]) / usual - 1.0, 2, signed=True)})" for test in odd]
+        )
         return f"the natural frequencies of test {who} differ from those of the other tests (mode {mode + 1})"
     each = listed(
-        [f"{np.exp(values[test]) / (2.0 * np.pi):.5g} Hz and {zeta[test]:.2g} % in {names[test]}" for test in every]
+        [
+            f"{np.exp(values[test]) / (2.0 * np.pi):.5g} Hz and {in_percent(zeta[test], digits=2)} in {names[test]}"
+            for test in every
+        ]
     )
     return f"the tests do not agree on the modes (frequency and damping ratio of mode {mode + 1}: {each})"

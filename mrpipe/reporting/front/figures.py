@@ -14,7 +14,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.front.laws import UNCONTROLLED, History, LawRun
 from mrpipe.reporting.style import AFTER, COLOURS, MEASURED, MODEL, figure_with_axes, label
 from mrpipe.reporting.words import percent
-from mrpipe.words import number
+from mrpipe.words import in_percent, number
 
 KIND_COLOURS = {"noise": "#999999", "after": AFTER, "before": MODEL, "network": COLOURS[2], "linear": COLOURS[7]}
 """Colour of each kind of model in the comparison of errors."""
@@ -61,8 +61,8 @@ def model_errors(rows: Sequence[tuple[str, float, str]]) -> Figure:
     axis.scatter(values, place, s=60, color=[KIND_COLOURS[row[2]] for row in rows], zorder=2)
     for y, value in zip(place, values, strict=True):
         ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-        axis.annotate(f"{number(value, 2)} %", (value, y), (8, 0), textcoords="offset points", va="center", fontsize=9,
-                      bbox=ground)  # fmt: skip
+        axis.annotate(in_percent(value / 100.0, digits=2), (value, y), (8, 0), textcoords="offset points",
+                      va="center", fontsize=9, bbox=ground)  # fmt: skip
     axis.set_yticks(place, [name for name, _, _ in rows], fontsize=9)
     axis.set_xscale("log")
     axis.set_xlim(left, 2.2 * max(values))
@@ -169,7 +169,7 @@ def candidate_shares(candidates: Sequence[Mapping[str, Any]], named: Sequence[st
     shares = [100.0 * max(float(item.get("share") or 0.0), 0.0) for item in shown]
     axis.barh(place, shares, 0.66, color=[AFTER if item["name"] in named else COLOURS[7] for item in shown])
     for y, share in zip(place, shares, strict=True):
-        axis.text(share + 1.0, y, f"{share:.0f} %", va="center", fontsize=9)
+        axis.text(share + 1.0, y, in_percent(share / 100.0), va="center", fontsize=9)
     axis.set_yticks(place, [item["name"] for item in shown], fontsize=9)
     axis.set_xlim(0.0, 112.0)
     axis.grid(axis="y", visible=False)

@@ -18,7 +18,13 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
-from mrpipe.reporting.traced_words import notes_on_model, shares_in_words, shown_candidates
+from mrpipe.reporting.traced_words import (
+    not_alone_in_words,
+    notes_on_model,
+    proper_effects,
+    shares_in_words,
+    shown_candidates,
+)
 from mrpipe.reporting.words import percent, quantity
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed, number, shell_word, shortest
@@ -66,11 +72,10 @@ def trust(facts: RunFacts) -> Section:
     section.table("errors", pd.DataFrame(rows), "RMS error over RMS force on the validation tests.")
     loop = facts.summary("close-loop")
     if "before" in loop:
-        ceiling = loop.get("ceiling") or {}
-        recovered = ceiling.get("recovered")
+        recovered = (loop.get("ceiling") or {}).get("recovered")
         text = f"Noise alone causes an error of {percent(loop['noise_floor_nrmse'])} "
         text += f"(estimated from {loop.get('noise_from', 'the sensors')})."
-        if statements.proper_effects(loop) and recovered is not None:
+        if proper_effects(loop) and recovered is not None:
             text += f" The named effects recover {percent(recovered)} of what a flexible model recovers of it."
         section.text(text)
         section.table(
@@ -154,7 +159,7 @@ def _of_structure(loop: Mapping[str, Any]) -> bool:
 
 def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
     """Add the effects that the model lacks, and how much each candidate recovers."""
-    effects = statements.proper_effects(loop)
+    effects = proper_effects(loop)
     for effect in effects:
         section.text(f"**{effect['name']}** (form {effect.get('form', '')}). {effect.get('physics', '')}")
         first = next((item.get("form") for item in loop.get("candidates", []) if item["name"] == effect["name"]), None)
@@ -168,7 +173,8 @@ def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
         section.figure(
             "candidates",
             figures.candidate_shares(shown_candidates(loop), [item["name"] for item in effects], shares_in_words(loop)),
-            f"Share {shares_in_words(loop)} that each effect recovers alone; named effects in blue.",
+            f"Share {shares_in_words(loop)} that each effect recovers alone; named effects in blue."
+            + not_alone_in_words(loop),
         )
 
 
@@ -183,7 +189,7 @@ def _traced_model(section: Section, facts: RunFacts, loop: Mapping[str, Any]) ->
         # the file of an own effect was moved or changed: the other results do not depend on it
         section.text(f"The parameters of the final model cannot be shown: {error}")
         return
-    for text in notes_on_model(loop, named=bool(statements.proper_effects(loop))):
+    for text in notes_on_model(loop, named=bool(proper_effects(loop))):
         section.text(text)
     section.table(
         "traced",
@@ -365,9 +371,7 @@ def next_steps(facts: RunFacts) -> Section:
     if wanted.get("tests"):
         caption = f"Tests that would decide what is open ({wanted['file']})."
         section.table("tests", tables.wanted_tests(wanted["tests"]), caption)
-    remedies = [
-        f"{effect['name']}: {effect['remedy']}" for effect in statements.proper_effects(loop) if effect.get("remedy")
-    ]
+    remedies = [f"{effect['name']}: {effect['remedy']}" for effect in proper_effects(loop) if effect.get("remedy")]
     if remedies:
         section.text("On the rig:")
         section.points(remedies)

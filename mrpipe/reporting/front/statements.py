@@ -14,7 +14,15 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
-from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first, tie_in_words, uncertainty
+from mrpipe.reporting.traced_words import (
+    exchange_in_words,
+    exchanged_form,
+    leading_first,
+    proper_effects,
+    tie_in_words,
+    uncertainty,
+    verdict_class,
+)
 from mrpipe.reporting.words import percent, plain, quantity, with_interval
 from mrpipe.words import counted, duration, in_percent, listed, noun, number
 
@@ -135,22 +143,6 @@ def missing(facts: RunFacts) -> str:
         share = summary["unexplained"]["share_of_residual"]
         text += f" A part stays unexplained ({percent(share)} of the squared residual)."
     return text
-
-
-def verdict_class(summary: Mapping[str, Any]) -> str:
-    """Return the class of a verdict; runs of older versions do not name it."""
-    if summary.get("verdict_class"):
-        return str(summary["verdict_class"])
-    if not summary["residual"]["structured"]:
-        return "noise"
-    if not proper_effects(summary):
-        return "unknown"
-    return "partly explained" if summary["unexplained"]["structured"] else "explained"
-
-
-def proper_effects(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the named effects, without the flexible model, which has no physical meaning."""
-    return [effect for effect in summary.get("effects", []) if effect["name"] != "unattributed"]
 
 
 def _value_of(effect: Mapping[str, Any]) -> str:

@@ -14,13 +14,18 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.traced_words import (
     determined,
     exchanged_form,
+    later_effects,
     leading_first,
+    proper_effects,
     shares_in_words,
     shown_candidates,
     uncertainty,
 )
 from mrpipe.reporting.words import plain, quantity, readable_unit
-from mrpipe.words import number
+from mrpipe.words import listed, number
+
+MOST_RIVALS = 8
+"""Largest number of candidates in a table; those that are named are shown in addition."""
 
 _COLUMNS = {
     "name": ("test", None),
@@ -38,18 +43,31 @@ _COLUMNS = {
 
 
 def rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
-    """Return the candidates of the tracing, best first."""
-    return pd.DataFrame(
-        [
-            {
-                "effect": item["name"],
-                "form": item.get("form", ""),
-                f"share {shares_in_words(loop)} [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
-                "error with it [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
-            }
-            for item in shown_candidates(loop)[:8]
-        ]
-    )
+    """Return the candidates of the tracing, best first, and the named effects that were not fitted alone."""
+    share, error = f"share {shares_in_words(loop)} [%]", "error with it [%]"
+    named = {effect["name"]: effect for effect in proper_effects(loop)}
+    shown = [item for place, item in enumerate(shown_candidates(loop)) if place < MOST_RIVALS or item["name"] in named]
+    rows = [
+        {
+            "effect": item["name"],
+            "form": item.get("form", ""),
+            share: f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
+            error: number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
+        }
+        for item in shown
+    ]
+    # the candidates are those of the first round; an effect that only a later round found was never fitted alone
+    later = [named[name] for name in later_effects(loop)]
+    if not rows or not later:
+        return pd.DataFrame(rows)
+    first = listed([name for name in named if name not in later_effects(loop)])
+    note = f"found in addition to {first}" if first else "not fitted alone"
+    rows = [{**row, "note": ""} for row in rows]
+    rows += [
+        {"effect": effect["name"], "form": effect.get("form", ""), share: "-", error: "-", "note": note}
+        for effect in later
+    ]
+    return pd.DataFrame(rows)
 
 
 def forms(loop: Mapping[str, Any]) -> pd.DataFrame:

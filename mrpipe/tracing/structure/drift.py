@@ -22,6 +22,7 @@ from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import base_rows
 from mrpipe.tracing.structure.model import FrameModel
 from mrpipe.tracing.structure.spectra import Spectra
+from mrpipe.words import in_percent
 
 Kind = Literal["constant", "amplitude", "drift", "step"]
 
@@ -99,9 +100,10 @@ class StiffnessBetweenTests:
             return ""
         first, last = self.tests[0].test, self.tests[-1].test
         how = f"steps before test {self.step_before}" if self.kind == "step" else f"drifts from test {first} to {last}"
+        change = in_percent(self.change, 1, signed=True)
         if self.storey:
-            return f"the stiffness of storey {self.storey} {how} by {100 * self.change:+.1f} %"
-        return f"the stiffness {how} by {100 * self.change:+.1f} % (frequencies {50 * self.change:+.1f} %)"
+            return f"the stiffness of storey {self.storey} {how} by {change}"
+        return f"the stiffness {how} by {change} (frequencies {in_percent(0.5 * self.change, 1, signed=True)})"
 
     def finding(self) -> str:
         """Return one line with a remedy for the user; empty if the stiffness does not drift."""

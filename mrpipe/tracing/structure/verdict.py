@@ -21,6 +21,7 @@ from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merg
 from mrpipe.tracing.structure.records import FASTEST_HZ, FrameData, frame_data
 from mrpipe.tracing.structure.scores import residual_in_time
 from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
+from mrpipe.words import in_percent
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,7 @@ def _lines(frame: FrameTracing, rules: FrameRules) -> list[str]:
     error = float(summary["before"]["nrmse"])
     if not summary["effects"] and summary["unexplained"]["structured"] and error > rules.unlikely_error:
         lines.append(
-            f"a linear frame misses {100.0 * error:.0f} % of the storey forces, and no effect explains it. So large an "
+            f"a linear frame misses {in_percent(error)} of the storey forces, and no effect explains it. So large an "
             "error often comes from the sign, the unit or the floor of a channel: see what mrpipe identify-frame finds"
         )
     return lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mrpipe.reporting.front.tables import effects, parameters, rivals, wanted_tests
-from mrpipe.reporting.traced_words import determined, shown_candidates
+from mrpipe.reporting.traced_words import determined, not_alone_in_words, shown_candidates
 
 pytestmark = pytest.mark.property
 
@@ -64,6 +64,28 @@ def test_the_share_of_a_candidate_does_not_count_an_exchanged_base_form(taken: s
         heading = "share of what the base form dahl-stiffness leaves above the noise [%]"
         assert table["effect"].tolist() == ["accumulator", "stribeck"]
         assert table[heading].tolist() == ["95.0", "10.0"]
+
+
+def test_a_named_effect_that_only_a_later_round_found_is_among_the_effects() -> None:
+    tried = [{"name": f"effect {place}", "form": "f", "share": 0.9 - 0.1 * place, "nrmse": 0.01} for place in range(9)]
+    loop = {
+        "candidates": tried,
+        "effects": [
+            {"name": "effect 0", "form": "f"},
+            {"name": "effect 8", "form": "f"},
+            {"name": "channel-skew", "form": "shift"},
+            {"name": "unattributed"},
+        ],
+    }
+    table = rivals(loop)
+    assert table["effect"].tolist() == [f"effect {place}" for place in range(9)] + ["channel-skew"]
+    assert table["note"].tolist() == [""] * 9 + ["found in addition to effect 0 and effect 8"]
+    assert table.iloc[-1, 1:4].tolist() == ["shift", "-", "-"]
+    said = " channel-skew was found in addition to others and was not fitted alone."
+    assert not_alone_in_words(loop) == said
+    # without such an effect the table is as short as before
+    loop["effects"] = loop["effects"][:1]
+    assert "note" not in rivals(loop) and len(rivals(loop)) == 8 and not_alone_in_words(loop) == ""
 
 
 @pytest.mark.golden

@@ -50,7 +50,7 @@ SPEED = 8.0
 _SPIKES = ("displacement", "force")
 """Quantities of a bench in which the check of spikes reports an error."""
 
-_SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+_SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²", "force": "N"}
 
 
 def _amplitude(values: FloatArray, quantity: str) -> float:

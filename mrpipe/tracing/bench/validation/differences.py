@@ -16,6 +16,7 @@ from mrpipe.tracing.bench.residuals.crossvalidation import left_out_residual
 from mrpipe.tracing.bench.residuals.nuisances import SessionGain
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
+from mrpipe.words import in_percent
 
 LAGS = 41
 """Numerical technique: number of lags on the grid; the best lag is refined by a parabola."""
@@ -347,9 +348,9 @@ _WORDS = {
     "gain": ("the measured force is {0:.3g} times the simulated one", "1"),
     "lag": ("the measured force is {0:.3g} s later than the simulated one", "s"),
     "offset": ("the measured force has an offset of {0:.3g} N that the training tests do not have", "N"),
-    "drive": ("{1:.0f} % of the samples have a drive that no training test has", "1"),
-    "amplitude": ("{1:.0f} % of the samples lie beyond the displacements of the training tests", "1"),
-    "speed": ("{1:.0f} % of the samples lie beyond the velocities of the training tests", "1"),
+    "drive": ("{1} of the samples have a drive that no training test has", "1"),
+    "amplitude": ("{1} of the samples lie beyond the displacements of the training tests", "1"),
+    "speed": ("{1} of the samples lie beyond the velocities of the training tests", "1"),
 }
 
 
@@ -359,4 +360,4 @@ def _difference(kind: str, found: Sequence[tuple[str, float]], tests: int) -> Di
     words, unit = _WORDS[kind]
     where = "all validation tests" if len(names) == tests > 1 else ", ".join(names)
     session = " (another session)" if len(names) == tests > 1 and kind in ("gain", "lag", "offset") else ""
-    return Difference(kind, names, value, unit, f"{where}: {words.format(value, 100.0 * value)}{session}")
+    return Difference(kind, names, value, unit, f"{where}: {words.format(value, in_percent(value))}{session}")
