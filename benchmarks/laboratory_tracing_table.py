@@ -19,9 +19,10 @@ _Item = TypeVar("_Item")
 
 HEAD = """# Effects planted in the virtual laboratory
 
-The virtual laboratory is part of the program and its damper is a Bouc-Wen damper, so this is the easy benchmark;
-[tracing-benchmark.md](tracing-benchmark.md) is the hard one. Each case is a campaign of 44 tests of 4 s (the plan
-`compact`) with effects that `campaign.yaml` does not declare. The truth is read after the verdict. Seeds are used once.
+This page measures how often effects are found that are planted in the virtual laboratory. The virtual laboratory is
+part of the program, and its damper is a Bouc-Wen damper, so that these cases are easier than those of the [tracing
+benchmark](tracing-benchmark.md). Each case is a campaign of 44 tests of 4 s (the plan `compact`) with effects that
+`campaign.yaml` does not declare. The planted effects are read only after the verdict. Each seed is used once.
 
     python -m benchmarks.laboratory_tracing --preset core conditions --first-seed {first} --results RESULTS.jsonl
     python -m benchmarks.laboratory_tracing_table RESULTS.jsonl

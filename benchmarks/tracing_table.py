@@ -19,19 +19,42 @@ from benchmarks.rigs.effects import LAWS
 
 HEAD = """# How often planted effects are found
 
-Bench campaigns of rigs that share neither code nor formulas with the program (`benchmarks/rigs`): 16 base forms from
-the literature, integrated at 20 kHz; planted effects in functional forms that differ from the library's wherever the
-physics allows it; forces from 100 N to 1 MN; white, coloured, 50 Hz or quantised noise; 500, 1000 or 2000 samples a
-second; validation tests like or unlike the training tests. Each case is one campaign directory, on which
-`mrpipe close-loop` runs as a user would run it. Each seed is one case, in a fixed layout: a third of the
-cases are clean rigs.
+This page measures how often `mrpipe close-loop` names the effect that a damper really has. The campaigns are simulated,
+so that the correct answer is known. An effect is *planted* if it is part of the simulated damper and the program is not
+given it.
+
+- The simulated rigs (`benchmarks/rigs`) share neither code nor formulas with the program.
+- The dampers have 16 base forms from the literature, integrated at 20 kHz, and forces from 100 N to 1 MN.
+- The equations of the planted effects differ from those of the library wherever the physics allows it.
+- The noise is white, coloured, quantised, or contains 50 Hz (`harmonics`). The sampling rate is 500, 1000 or 2000 Hz.
+- The validation tests have the same kinds of motion as the training tests (`alike`) or other kinds (`unlike`).
+- A third of the cases are *clean* rigs, that is, rigs without an effect.
+
+Each seed of the random generator gives one case, which is one campaign directory. `mrpipe close-loop` runs on it as a
+user would run it:
 
     python -m benchmarks.tracing --first-seed {first} --cases {count}
     python -m benchmarks.tracing_table benchmarks/results/tracing.jsonl
 
-Number of cases in this table: {count}, seeds {first} to {last}. Cases of former states of the program are
-[earlier cases](tracing-benchmark-earlier.md). [Rigs of other generators](tracing-benchmark-other-rigs.md) were
-written from the contract of a campaign alone.
+Number of cases in this table: {count}, seeds {first} to {last}. Results of earlier versions of the program are on
+[a separate page](tracing-benchmark-earlier.md), and so are results on [rigs of other
+generators](tracing-benchmark-other-rigs.md).
+
+**How to read the tables.** The columns of rates count correct verdicts:
+
+| column | a verdict is correct if |
+| --- | --- |
+| clean: none | no effect is named on a clean rig |
+| single: first | one effect is planted, and it is the first name |
+| single: alone | one effect is planted, and it is the only name |
+| pair: both | two effects are planted, and both are named |
+| outside: unknown | the planted effect is not in the library, none is named, and the residual is reported as unknown |
+| floor right (clean) | the noise floor is within 25 % of the error of the true model on a clean rig |
+
+In the table of all cases, *share of force* is the RMS of the force that the effect changes, over the RMS of the force
+without it. *True model* is the NRMSE of the simulated damper itself on the noisy records. *Class* is `verdict_class`,
+and *base taken* is the base form of the final model. *Before*, *after* and *noise floor* are NRMSE
+([glossary](glossary.md)). A name that is wrong or incomplete is in bold.
 """
 
 _Item = TypeVar("_Item")

@@ -40,7 +40,7 @@ class GainRange:
     optional
         Whether the gain may be 0.
     softens
-        Whether the gain is a negative stiffness of the device, whatever its sign.
+        Whether the gain acts as a negative stiffness of the device, for either sign of its number.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The identified structure against its forced tests, with constant and with amplitude-dependent modes."""
+"""Comparison of the identified structure with its forced tests, for constant and amplitude-dependent modes."""
 
 from __future__ import annotations
 

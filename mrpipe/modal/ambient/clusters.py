@@ -115,7 +115,7 @@ def without_copies(
         Stable poles.
     weights
         Shape (s,): weights of the sensors for the comparison of shapes. Modes are orthogonal to the mass, so that these
-        are the roots of the floor masses where they are known; a light mast would otherwise make all shapes alike.
+        are the roots of the floor masses where they are known; otherwise a light mast would dominate all shapes.
     is_second_peak
         Whether the spectra show a pole (the first argument) in addition to another one, each as frequency and damping.
     """

@@ -7,7 +7,8 @@ that of a stationary force. Its lines are not independent, however: only the eff
 
 gives independent information. The energy of a motion in parts of the record shows it. Under a stationary force, the
 energy in a part of length T_p scatters with the relative variance 1/(1 + B T_p), with the bandwidth B of the motion.
-More scatter than that is the relative variance of g^2. The whole record counts where it is not more than by chance.
+A larger scatter is due to the relative variance of g^2. If the scatter is not larger than expected by chance, the
+effective duration is that of the whole record.
 
 The correlation functions of a short block have the poles of the structure for any strength of the force, because the
 motion at its beginning decays freely, and the later force is independent of it. Blocks can therefore be weighted. Over

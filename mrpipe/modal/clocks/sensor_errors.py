@@ -1,14 +1,14 @@
-"""Errors of sensors with drifting clocks, taken out of the spectra of a fit: cross-talk, and rests of the clocks.
+"""Removal of sensor errors from spectra, if clocks drift: cross-talk, and remaining errors of the corrected clocks.
 
 A sensor shows a small share of the motion of the other sensors (cables, housings, amplifiers). If all sensors have the
 same clock, this share only changes the mode shapes a little. If the clocks run differently, the correction of the clock
-of a sensor turns the share of the others against the response: their resonances appear smeared over neighbouring lines.
+of a sensor makes the phase of the shares of the others drift: their resonances are smeared over neighbouring lines.
 A drift or a step of a clock that was estimated wrongly has the same effect. Near a strong mode this is more than the
 noise, and it changes the damping ratio of a hidden mode there.
 
 Both are estimated by linear regression. After correction of the clocks, sensor i contains a share of the fitted
 response y_j of sensor j at the time t + d_i(t) - d_j(t), where d are the delays, and the fitted derivative of y_i times
-the rest of its delay, a polynomial of time.
+the remaining error of its delay, a polynomial of time.
 """
 
 from __future__ import annotations

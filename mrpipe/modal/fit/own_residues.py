@@ -2,7 +2,7 @@
 
 Cross-talk, cables and mounts differ between tests. A fit with common residues then leaves a part of every strong mode
 in the residual. This part is not noise. It shifts a hidden mode next to a strong one by more than its interval. With
-residues of each test the contradiction disappears from the poles.
+separate residues for each test, the differences between the tests no longer affect the poles.
 """
 
 from __future__ import annotations

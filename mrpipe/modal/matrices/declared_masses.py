@@ -1,4 +1,4 @@
-"""Declared floor masses against those that the same data give.
+"""Comparison of the declared floor masses with those that the data give.
 
 For the right masses the modes are orthogonal. Where all floors have a sensor, orthogonality therefore gives the ratios
 of the masses, and the response to a measured force gives their common size. A wrong mass and a wrong gain g of the

@@ -5,8 +5,8 @@ oscillation matrices; the same holds for a beam in bending). Exchanged sensors g
 changes. Such shapes can be orthogonal and predict the response well, because they are those of a structure whose
 springs connect the floors in another order. Another order of the floors is therefore reported if it gives each mode the
 right number of sign changes, and if springs between neighbouring floors describe the modes significantly better in it.
-In the first mode of a chain of springs each floor also moves more than the floors below it. A wall in bending is no
-chain of springs: upside down it would be a slightly better one, but its first mode excludes this order.
+In the first mode of a chain of springs each floor also moves more than the floors below it. This condition excludes a
+wrong order of a wall in bending: a wall is not a chain of springs, and its reversed order resembles one more closely.
 """
 
 from __future__ import annotations

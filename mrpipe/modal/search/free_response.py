@@ -1,4 +1,4 @@
-"""Frequency, damping and shape from free decays, for modes that the forced tests hardly show.
+"""Frequency, damping and shape from free decays, for modes that the forced tests hardly excite.
 
 A shaking table hardly excites the highest modes of a tall frame, so that their peaks are below the noise of a sweep. A
 decay test has driven its mode at resonance before the release, so that the mode dominates. After the stop the

@@ -2,10 +2,11 @@
 
 Groups of lines show a residual that exceeds the noise, whatever its form. A force of known form is found far below the
 noise, because its projection onto the residual adds up over all lines (matched filter). Such a residual is too small
-to show that the form is right. The effect is therefore named only if no other effect of the library imitates it, if
-nothing significant remains for the others, and if single tests show it: what differs between tests alone may be a
-change of the structure or of a sensor. Only nonlinear forces count, because small differences between the frequency
-responses of the sensors leave a linear residual, which an oscillating base would explain.
+to show that the form is right. The effect is therefore named only under three conditions: no other effect of the
+library imitates it, nothing significant remains for the others, and the effect is visible within single tests, because
+a difference between tests may be a change of the structure or of a sensor. Only nonlinear forces are considered,
+because small differences between the frequency responses of the sensors leave a linear residual, which an oscillating
+base would explain.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 In a structure that bends, such as a wall, a storey's shear force depends on the displacements of all floors, and its
 higher modes are much faster than those of a shear frame with the same lowest mode. Band and weights therefore follow
-from the general linear frame, fitted again and again with the weights of the fit before. Modes beyond the band act
-through the ground acceleration (quasi-static response); its coefficients are part of the frame.
+from the general linear frame, which is fitted repeatedly, each time with the weights of the previous fit. Modes beyond
+the band act through the ground acceleration (quasi-static response); its coefficients are part of the frame.
 
 Above the band such a structure still moves, so the noise of a sensor cannot be measured there. It is bounded by the
 residual: the noise of each sensor enters the equation of each storey with a known gain, and cannot exceed the residual
@@ -62,7 +62,7 @@ def natural_frequencies(weighting: Weighting, masses: FloatArray) -> FloatArray:
 
 
 def bounded(record: Spectra, noise: Noise, masses: FloatArray) -> Noise:
-    """Return the noise of the sensors of a record, lowered where its residual leaves no room for it.
+    """Return the noise of the sensors of a record, lowered where it exceeds the residual.
 
     A linear frame is fitted to the record alone. The mean square of its residual, in each storey and part of the band,
     is at least that of the noise of each sensor alone, propagated by the fitted frame.

@@ -4,7 +4,7 @@ Each storey has its own equation of motion, and all motions in it are measured. 
 leaves a residual only in the storeys on which its force acts. What remains in another storey has another cause, even
 if it is small compared with what the first effect explains. Such a storey is searched alone, and a further effect is
 accepted under four conditions: it explains most of what the storey lacks beyond all forms of the effects before it;
-also beyond linear frames that differ from test to test, because a change of the structure or a faulty sensor is no
+also beyond linear frames that differ from test to test, because a change of the structure or a faulty sensor is not an
 effect; it lowers the error of the storey on tests that are left out; and no other effect does so almost as well.
 """
 

@@ -5,7 +5,7 @@ displacements, whatever the order of the floors. The order is judged by two prop
 floor stands on the one below it, whether it shears or bends:
 
 - In the lowest mode, the displacement grows from floor to floor.
-- Neighbouring floors move more alike than other floors, in all modes together.
+- The motions of neighbouring floors are more similar than those of other floors, in all modes together.
 
 The exchange of two floors is reported if both hold in every test after it, and the first one in no test before it.
 """

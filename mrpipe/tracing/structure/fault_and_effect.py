@@ -1,4 +1,4 @@
-"""A faulty sensor and a missing effect in one campaign: neither of them alone explains the residual.
+"""A faulty sensor and a missing effect in one campaign, if neither of them alone explains the residual.
 
 The fault is sought in the residual of the linear frame and, where an effect explains most of it, in the residual with
 this effect. The records are corrected, and effects are selected again. The force of the effect is then subtracted, so

@@ -1,4 +1,4 @@
-"""Fit of linear frame and effects to the equations of motion of the storeys; amplitudes are solved for."""
+"""Fit of linear frame and effects to the equations of motion of the storeys; amplitudes follow by least squares."""
 
 from __future__ import annotations
 

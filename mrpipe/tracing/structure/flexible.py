@@ -1,4 +1,4 @@
-"""An effect that may combine all its forms: what then remains is not an error of its form."""
+"""An effect with a free combination of all its forms, so that the remaining residual is not an error of its form."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Errors of a frame with effects on training records that were left out of its fit.
 
 An effect with more parameters fits the training records better, whether or not it is the right one. Left-out records
-decide between effects that fit alike, and whether each of several effects is needed.
+decide between effects that fit equally well, and whether each of several effects is needed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Validation tests that differ from the training tests: their error is far above the noise, that of training is not."""
+"""Validation tests that differ from the training tests, because only their error is far above the noise."""
 
 from __future__ import annotations
 

@@ -31,7 +31,8 @@ def on_rocking_base(
     jobs
         Processes.
     least_share
-        Share of what the shear frame lacks below which the search is skipped.
+        Least share of the residual of the shear frame above the noise that a rocking base must explain. The search is
+        skipped if the forms of the base explain less than half of it at their start values.
     """
     base_forms = [item for item in forms if item.effect.acts_on == "base"]
     if not base_forms:

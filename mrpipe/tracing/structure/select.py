@@ -192,10 +192,10 @@ def beyond_forms(selection: FrameSelection, further: FrameCandidate) -> bool:
 def by_left_out_error(
     candidates: Sequence[FrameCandidate], selection: FrameSelection, folds: Folds | None, lead: float
 ) -> tuple[FrameCandidate, ...]:
-    """Return candidates best first, with the share that each is behind the best.
+    """Return candidates, best first, with the share of the gain of the best one that each does not reach.
 
     The order is that of the shares on the training records. Errors on left-out records decide between candidates that
-    fit almost alike.
+    fit almost equally well.
 
     Parameters
     ----------
@@ -206,8 +206,8 @@ def by_left_out_error(
     folds
         Records that are left out in turn; None if there is only one.
     lead
-        Candidates fit alike if what they leave exceeds what the best one leaves by this share of it, and by what a
-        further effect must recover.
+        Candidates fit almost equally well if their residual exceeds that of the best candidate by at most this share of
+        it plus the share of the whole residual that a further effect must recover.
     """
     if not candidates:
         return ()
@@ -230,7 +230,7 @@ def by_left_out_error(
 def _decided(
     alike: Sequence[FrameCandidate], left_out: Sequence[FloatArray], selection: FrameSelection
 ) -> tuple[FrameCandidate, ...]:
-    """Return candidates that fit alike, best first, with the information which of them may be as good as the best.
+    """Return candidates that fit almost equally well, best first; each says whether it may be as good as the best.
 
     Left-out records alone cannot separate all effects: the record with the largest drift, which shows a bumper best,
     is never left out. An effect is therefore also separated by the errors on all training records.

@@ -1,8 +1,8 @@
-"""Effects that explain a residual alike: none of them is named, and the test that separates them is proposed.
+"""Ties: effects that explain a residual equally well. None is named; the test that separates them is proposed.
 
 Each effect is compared in its best form. A rival of the best effect leaves hardly more of the residual, and predicts
 the tests that were left out hardly worse. The best effect is named, with its rivals, if its errors are smaller with
-certainty on the tests that were left out, or on all training tests. Otherwise they are tied: a name would be a guess.
+certainty on the tests that were left out, or on all training tests. Otherwise the effects are tied, and none is named.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From the draft to all training tests: the winner of a race, its candidates, and the winner with further terms."""
+"""Fits to all training tests after a race: of its winner, of its candidates, and of the winner with further terms."""
 
 from __future__ import annotations
 

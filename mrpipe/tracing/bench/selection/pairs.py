@@ -1,4 +1,4 @@
-"""Play together with a rounded yield: two effects that hide each other if they are searched one after the other.
+"""Backlash (play) together with a rounded yield, which hide each other if they are searched one after the other.
 
 Both delay the force at a reversal. If a rounded yield is fitted without play, its shape becomes so wrong that a small
 play does not improve the fit. Therefore play is also tried together with the starting points of the base form.
