@@ -95,6 +95,9 @@ def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path,
         return ["never built"]
     if manifest.failed and manifest.skipped:
         return [f"the last run of it failed: {manifest.failed}"]
+    if manifest.skipped and not (manifest.key.inputs or manifest.key.settings or manifest.key.code):
+        # a stage that was skipped before it could run has no key to compare with
+        return ["never built"]
     reasons = []
     for name in sorted({*manifest.key.inputs, *key.inputs}):
         before, now = manifest.key.inputs.get(name), key.inputs.get(name)

@@ -22,7 +22,7 @@ from mrpipe.control.kernel import (
     MEASURED_VELOCITY,
 )
 from mrpipe.control.laws import law_named, law_names
-from mrpipe.control.lqg import Weights
+from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
 from tests.control.stepped import commands_of
@@ -150,6 +150,48 @@ def test_the_drive_has_the_unit_of_the_damper(set_c):
     parameters = json.loads(files["controller.json"])["parameters"]
     assert parameters["drive_limit"]["unit"] == "V" and parameters["k_n_m"]["unit"] == "N/m"
     assert "largest drive [V]" in files["controller.h"] and "[drive]" not in "".join(files.values())
+
+
+def _files(law: str, frame, position, damper, **options) -> dict[str, str]:
+    controller = build_controller(
+        law,
+        Gains(alpha_n_m=3000.0) if law == "fdns" else Gains(),
+        ControllerOptions(drive_limit=4.0, **options),
+        inverse=inverse_table(damper),
+        observer=lqg_observer(frame, position, Weights(), 0.005),
+        position=position,
+    )
+    return controller_files(controller, "rig", {"drive_unit": "A"})
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("law", "options", "read"),
+    [
+        ("fdns", {}, ("DISPLACEMENT", "ACCELERATION")),
+        ("fdns", {"velocity": "difference"}, ("DISPLACEMENT",)),
+        ("lqg", {"velocity": "measured"}, ("DISPLACEMENT", "VELOCITY", "GROUND", "FORCE", "FLOORS")),
+        ("lqg", {"observer_force": "desired"}, ("DISPLACEMENT", "ACCELERATION", "GROUND", "FLOORS")),
+        ("energy-dissipation", {}, ("DISPLACEMENT", "ACCELERATION", "FORCE")),
+    ],
+)
+def test_readme_and_header_name_the_readings_of_the_law(law, options, read, thesis_frame, floor_one, set_c) -> None:
+    """The force of the damper had not been named, and every law had seemed to read the velocity."""
+    files = _files(law, thesis_frame, floor_one, set_c, **options)
+    for name in ("DISPLACEMENT", "ACCELERATION", "VELOCITY", "GROUND", "FORCE", "FLOORS"):
+        assert (f"- `RIG_MEASURED_{name}`" in files["README.md"]) == (name in read), name
+        line = next(row for row in files["controller.h"].splitlines() if f"RIG_MEASURED_{name} " in row)
+        assert ("not used by this controller" in line) == (name not in read), name
+
+
+@pytest.mark.golden
+def test_the_header_says_which_gains_have_no_effect(thesis_frame, floor_one, set_c) -> None:
+    lines = _files("fdns", thesis_frame, floor_one, set_c)["controller.h"].splitlines()
+    idle = {
+        name: any(f"PARAMETER_{name} " in row and "no effect" in row for row in lines)
+        for name in ("C_N_S_M", "ALPHA_N_M")
+    }
+    assert idle == {"C_N_S_M": True, "ALPHA_N_M": False}
 
 
 @pytest.mark.golden
