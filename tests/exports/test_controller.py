@@ -82,19 +82,19 @@ CASES = [*((law, "table") for law in law_names()), *((law, "network") for law in
 KNOWN = {"vd": Gains(650.0), "vdns": Gains(250.0, -4500.0), "fdns": Gains(alpha_n_m=3000.0)}
 
 
-def controller_of(law: str, kind: str, frame, position, damper) -> Controller:
+def controller_of(law: str, kind: str, frame, position, damper, **more) -> Controller:
     """Return a controller that reads the motion of `recorded_signal` in all its parts."""
     entry, rate = law_named(law), 500.0 if law == "fdns" else 200.0
     plant = plant_of(frame, position, CalibrationOptions(mode=1))
     gains = KNOWN.get(law) or next(iter(entry.candidates(plant).values()), Gains())
+    bounds = {"residual_force_n": 12.0, "saturation_force_n": 40.0} if law == "fdns-bounded" else {}
     options = ControllerOptions(
         rate_hz=rate,
         drive_limit=4.0,
         bias_drift_m_s2=0.01,
         dead_band_m_s=1e-3,
         inverse_request="history",
-        residual_force_n=12.0 if law == "fdns-bounded" else 0.0,
-        saturation_force_n=40.0 if law == "fdns-bounded" else None,
+        **{**bounds, **more},
     )
     return build_controller(
         law,
@@ -143,6 +143,21 @@ def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.oracle
+def test_c_equals_python_without_a_load_cell(tmp_path, thesis_frame, floor_one, set_c):
+    bounds = {"residual_force_n": 12.0, "saturation_force_n": 40.0}
+    parts = thesis_frame, floor_one, set_c
+    controller = controller_of("lqg", "table", *parts, observer_force="expected", **bounds)
+    signal = recorded_signal(controller.measured_size, controller.options.rate_hz)
+    python, c = commands_of(controller, signal), in_c(controller, signal, tmp_path)
+    np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
+    # the reading of the force has no effect, and the bounds have one
+    signal[:, MEASURED_FORCE] = np.nan
+    np.testing.assert_array_equal(commands_of(controller, signal), python)
+    free = controller_of("lqg", "table", *parts, observer_force="expected")
+    assert not np.allclose(commands_of(free, signal)[:, COMMAND_DRIVE], python[:, COMMAND_DRIVE])
+
+
 @pytest.mark.golden
 def test_the_drive_has_the_unit_of_the_damper(set_c):
     controller = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse_table(set_c))
@@ -171,7 +186,7 @@ def _files(law: str, frame, position, damper, **options) -> dict[str, str]:
         ("fdns", {}, ("DISPLACEMENT", "ACCELERATION")),
         ("fdns", {"velocity": "difference"}, ("DISPLACEMENT",)),
         ("lqg", {"velocity": "measured"}, ("DISPLACEMENT", "VELOCITY", "GROUND", "FORCE", "FLOORS")),
-        ("lqg", {"observer_force": "desired"}, ("DISPLACEMENT", "ACCELERATION", "GROUND", "FLOORS")),
+        ("lqg", {"observer_force": "expected"}, ("DISPLACEMENT", "ACCELERATION", "GROUND", "FLOORS")),
         ("energy-dissipation", {}, ("DISPLACEMENT", "ACCELERATION", "FORCE")),
     ],
 )
