@@ -153,6 +153,7 @@ def expected(fault: Mapping[str, Any]) -> str:
         least = int(context.get("min_length", 1))
         return f"a list of at least {counted(least, 'value')} expected"
     plain = {
+        "string_pattern_mismatch": "a name of letters, digits and _ expected, which does not begin with a digit",
         "finite_number": "a finite number expected",
         "float_parsing": "a number expected",
         "float_type": "a number expected",

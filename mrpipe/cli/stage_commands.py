@@ -24,6 +24,8 @@ _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
 _ONE_DAMPER = frozenset({"controller", "damper", "frame"})
 """Exports that contain exactly one damper, its control law or its place in the structure."""
 _FORMATS = ("c", "json", "matlab", "onnx")
+_FORMATS_OF: dict[str, tuple[str, ...]] = {"controller": ("c", "json"), "opensees": ()}
+"""Formats of the exports that are always written in the same formats."""
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -357,11 +359,15 @@ def export(
             "export",
             what,
             "is not supported with structure.dampers, because it knows one damper and one law",
-            "export opensees for the structure, or use a configuration with one damper",
+            "export opensees for the structure, or describe a single damper by calibrate.damper, "
+            "calibrate.damper_floor and calibrate.damper_across_storey in place of structure.dampers",
         )
     for name in formats or ():
         if name not in _FORMATS:
             raise UserError("--format", name, "is not a format", nearest(name, _FORMATS))
+        if name not in _FORMATS_OF.get(what, _FORMATS):
+            remedy = f"leave --format out; it is written as {' and '.join(_FORMATS_OF[what]) or 'a Python script'}"
+            raise UserError("--format", name, f"is not a format of {what}", remedy)
     options = options if damper is None else _with_damper(options, damper)
     given = {"gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]

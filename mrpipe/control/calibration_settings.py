@@ -49,8 +49,8 @@ class RegulatorSettings(Section):
         None,
         ge=0.0,
         description="Error of the damper force that the observer takes, as noise: the change of a measured force "
-        "within a sample, or the difference between a desired force and that of the damper; null: residual force of "
-        "the damper.",
+        "within a sample, or the difference between an expected force and that of the damper; null: residual force "
+        "of the damper.",
     )
 
     def known(self) -> dict[str, float]:

@@ -81,7 +81,7 @@ def central_regulator(
     top displacement, and the noise, are those of the first damper; each damper has its own weight of the force.
 
     A damper behind a brace measures the displacement of its rod, w'x - f/k_b. For f the observer takes the measured
-    force of the damper, or the desired one (`observer_force` of :class:`~mrpipe.control.settings.ControllerSettings`).
+    force of the damper, or the expected one (`observer_force` of :class:`~mrpipe.control.settings.ControllerSettings`).
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ AT_LIMITS = 16  # where in `numbers` the largest plausible readings are; 0: not 
 STATE_GOOD = 17  # where in `state` the last good readings are
 CHANNELS = 18  # number of measurements
 HOLD = 19  # number of samples for which the last good reading replaces a refused one
-OBSERVER_FORCE = 20  # 1 where the observer takes the measured force of the damper, 0: the desired one
+OBSERVER_FORCE = 20  # 1 where the observer takes the measured force of the damper, 0: the expected one
 LAYOUT_SIZE = 24
 # a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`
@@ -123,6 +123,13 @@ LAW_SIGNATURE = float64(float64[::1], int64[::1], float64[::1], float64[::1])
 
 LAW_FUNCTION = types.FunctionType(LAW_SIGNATURE)
 """Compiled type of such a function, for the signatures of kernels that call it."""
+
+
+@njit(float64(float64[::1], float64[::1]), cache=True)
+def expected_force(numbers: FloatArray, state: FloatArray) -> float:
+    """Return the last desired force [N] within the residual and the largest force of the damper, along the motion."""
+    least = numbers[RESIDUAL_FORCE]
+    return state[S_DIRECTION] * min(max(abs(state[S_FORCE]), least), max(numbers[LARGEST_FORCE], least))
 
 
 @njit(int64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)

@@ -20,7 +20,7 @@ Need = Literal["network", "observer", "floor-accelerations", "damper-force", "ob
 
 `network`: the trained reference network. `observer`: a state observer, which reads all accelerometers.
 `floor-accelerations`: the accelerometers of ground and floors. `damper-force`: a load cell at the damper.
-`observer-force`: the same for the observer alone, which can take the desired force in its place.
+`observer-force`: the same for the observer alone, which can take an expected force in its place.
 `drive-limit`: the largest drive of the damper.
 """
 

@@ -60,7 +60,7 @@ class Weights:
         Noise of the measured ground acceleration, including model error, which excites the state [m/s^2].
     force_noise_n
         Error of the force that the observer holds over a sample, taken as noise [N]. The measured force changes within
-        the sample; a desired force also differs from that of the damper, by at least the residual force.
+        the sample; an expected force also differs from that of the damper.
     displacement_noise_m, acceleration_noise_m_s2
         RMS noise of the sensors [m], [m/s^2].
     """
@@ -139,7 +139,7 @@ def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray,
 def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> Observer:
     """Return the sampled observer and its regulator for :func:`~mrpipe.control.controller.build_controller`.
 
-    The observer predicts from the measured ground acceleration and the measured force of the damper, or the desired
+    The observer predicts from the measured ground acceleration and the measured force of the damper, or an expected
     one, and corrects with the damper displacement and the floors' absolute accelerations. The desired damper force,
     positive where it resists as in (4.1), is minus the force on the structure that the regulator demands.
     """

@@ -148,7 +148,7 @@ class ControllerArrays:
 
 
 def _observer_reads_force(options: ControllerOptions, law: Law) -> bool:
-    """Return whether the observer of the law takes the measured force of the damper in place of the desired one."""
+    """Return whether the observer of the law takes the measured force of the damper in place of an expected one."""
     return "observer-force" in law.needs and options.observer_force == "measured"
 
 

@@ -45,11 +45,11 @@ class ControllerSettings(Section):
         "forces, as in (2.9); at a reversal no measured force has such a history, so that the network answers with "
         "spikes.",
     )
-    observer_force: Literal["measured", "desired"] = Field(
+    observer_force: Literal["measured", "expected"] = Field(
         "measured",
         description="Force that the observer of `lqg` takes for that of the damper. `measured`: the reading of a load "
-        "cell. `desired`: the last desired force, for a damper without a load cell; the estimate is wrong where the "
-        "damper cannot give this force.",
+        "cell. `expected`, for a damper without a load cell: the last desired force, between the residual and the "
+        "largest force of the damper and in the direction of its motion.",
     )
     residual_force_n: float | None = Field(
         None,

@@ -137,14 +137,14 @@ class TogetherDamping:
         Largest real part of all eigenvalues [1/s].
     slowest_1_s
         Smallest decay rate of a motion without oscillation [1/s]; infinite if there is no such motion.
-    free_rad_s
-        Angular frequency of each target mode without devices, shape (m,) [rad/s].
+    natural_rad_s
+        Natural angular frequency of each target mode with the static stiffness of the devices, shape (m,) [rad/s].
     """
 
     poles: ComplexArray
     growth_1_s: float
     slowest_1_s: float
-    free_rad_s: FloatArray
+    natural_rad_s: FloatArray
 
     @property
     def stable(self) -> bool:
@@ -162,11 +162,11 @@ class TogetherDamping:
         """Damping ratio of each target mode, shape (m,); of an overdamped mode its decay rate over its frequency.
 
         The damping ratio of a real pole is 1, however slowly the mode returns. Its effective damping ratio is the
-        smallest decay rate of a motion without oscillation over the angular frequency without devices, at most 1. For a
-        single degree of freedom with a dashpot this is zeta - sqrt(zeta^2 - 1).
+        smallest decay rate of a motion without oscillation over the natural angular frequency, at most 1. For a single
+        degree of freedom with a spring and a dashpot this is zeta - sqrt(zeta^2 - 1).
         """
         ratios = self.damping_ratios
-        slow = np.minimum(1.0, self.slowest_1_s / self.free_rad_s)
+        slow = np.minimum(1.0, self.slowest_1_s / np.maximum(self.natural_rad_s, 1e-300))
         return np.where(ratios >= CRITICAL, slow, ratios)
 
 
@@ -199,8 +199,20 @@ def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Seque
         poles=np.array(poles, dtype=np.complex128),
         growth_1_s=float(-np.min(rates)),
         slowest_1_s=float(np.min(real)) if real.size else math.inf,
-        free_rad_s=np.array([omega[mode - 1] for mode in modes]),
+        natural_rad_s=_natural_frequencies(frame, devices)[np.array(modes) - 1],
     )
+
+
+def _natural_frequencies(frame: Frame, devices: Sequence[LinearDevice]) -> FloatArray:
+    """Return the natural angular frequencies with the static stiffness of the devices [rad/s]; 0 where it is unstable.
+
+    The frequency belongs to the stiffness with which a mode returns, which a device with negative stiffness reduces.
+    """
+    stiffness = frame.stiffness.copy()
+    for item in devices:
+        stiffness += item.dynamic_stiffness(0.0).real * np.outer(item.position, item.position)
+    squared = np.linalg.eigvals(np.linalg.solve(frame.mass, stiffness)).real
+    return np.asarray(np.sqrt(np.maximum(np.sort(squared), 0.0)))
 
 
 def _slopes(frame: Frame, devices: Sequence[LinearDevice]) -> list[complex]:

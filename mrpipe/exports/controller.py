@@ -70,6 +70,31 @@ PARAMETERS: dict[str, tuple[int, str, str]] = {
 }
 """Named parameters of every controller: place among its numbers, unit and meaning. They may change at run time."""
 
+_GAINS = {"c_n_s_m": "GAIN_C", "k_n_m": "GAIN_K", "alpha_n_m": "GAIN_ALPHA"}
+"""Names of the gains in the C code of a law."""
+
+_READINGS = {
+    "MEASURED_DISPLACEMENT": "displacement of the damper [m]",
+    "MEASURED_ACCELERATION": "acceleration of the damper: that of one end minus that of the other [m/s^2]",
+    "MEASURED_VELOCITY": "velocity of the damper [m/s]",
+    "MEASURED_GROUND": "absolute acceleration of the ground [m/s^2]",
+    "MEASURED_FORCE": "force of the damper by a load cell, positive where it resists the motion [N]",
+    "MEASURED_FLOORS": "from here on: absolute acceleration of each floor [m/s^2]",
+}
+
+_COMMANDS = {
+    "COMMAND_DRIVE": "drive to be held until the next call [drive]",
+    "COMMAND_FORCE": "desired force after clipping [N]",
+    "COMMAND_UNCLIPPED": "desired force of the law [N]",
+    "COMMAND_DISPLACEMENT": "estimated displacement of the damper [m]",
+    "COMMAND_VELOCITY": "estimated velocity of the damper [m/s]",
+    "COMMAND_AMPLITUDE": "last extremum of the displacement [m]",
+    "COMMAND_CLIPPED": "1 where clipping set the force to zero",
+    "COMMAND_SWITCHED": "1 where the force is below the residual force, so that the drive is 0",
+    "COMMAND_INVERSE": "drive before switch, low-pass and limits [drive]",
+    "COMMAND_FAULT": "0; 1 while a refused reading is replaced by the last good one; 2 at the safe drive",
+}
+
 VECTOR_ROWS = 400
 _FAULT = slice(300, 340)
 """Rows of the test vectors in which the displacement cannot be true."""
@@ -109,7 +134,7 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
                 "for (int place = 0; place < OUTPUTS; ++place) output[place] = command[place];",
             ),
         ),
-        "README.md": _readme(controller, prefix),
+        "README.md": _readme(controller, prefix, unit),
     }
 
 
@@ -191,25 +216,51 @@ def _in_unit(unit: str, drive_unit: str) -> str:
     return drive_unit if unit == DRIVE else unit
 
 
+def _is_read(controller: Controller, name: str) -> bool:
+    """Return whether the controller uses a reading; `name` is that of its index, such as MEASURED_FORCE."""
+    place = getattr(kernel, name)
+    if place >= kernel.MEASURED_FLOORS:
+        return controller.floors > 0
+    if place == kernel.MEASURED_ACCELERATION:
+        known = (network.features.channels for network in controller.networks.values())
+        return controller.options.velocity == "kalman" or any("acceleration" in channels for channels in known)
+    return bool(controller.numbers[controller.layout[kernel.AT_LIMITS] + place] > 0.0)
+
+
+def _index(controller: Controller, upper: str, name: str, drive_unit: str) -> str:
+    """Return the definition of an index into measured[] or command[], with its meaning."""
+    meaning = {**_READINGS, **_COMMANDS}.get(name, "")
+    if name in _READINGS and not _is_read(controller, name):
+        meaning += "; not used by this controller, may be 0"
+    comment = f" /* {meaning.replace(f'[{DRIVE}]', f'[{drive_unit}]')} */" if meaning else ""
+    return f"#define {upper}_{name} {getattr(kernel, name)}{comment}"
+
+
+def _parameter(controller: Controller, upper: str, name: str, drive_unit: str) -> str:
+    """Return the definition of the index of a parameter, with its meaning."""
+    place, unit, meaning = PARAMETERS[name]
+    law = law_named(controller.law)
+    if name in _GAINS and _GAINS[name] not in law.c_body + law.c_helpers:
+        meaning += f"; no effect under law {law.name}"
+    return f"#define {upper}_PARAMETER_{name.upper()} {place} /* {meaning} [{_in_unit(unit, drive_unit)}] */"
+
+
 def _header(controller: Controller, prefix: str, drive_unit: str) -> str:
     upper = prefix.upper()
     lines = [
-        f"/* Controller of law {controller.law}: Kalman velocity, law, clipping, inverse, switch, low-pass, limits. */",
+        f"/* Controller of law {controller.law}: velocity, law, clipping, inverse, switch, low-pass, limits. */",
         f"#ifndef {upper}_CONTROLLER_H",
         f"#define {upper}_CONTROLLER_H",
         "",
         c_text.precision_header(prefix),
-        "/* Indices into measured[] (SI) and command[]. */",
-        *(f"#define {upper}_{name} {getattr(kernel, name)}" for name in _MACROS),
+        "/* Indices into measured[] and command[]. */",
+        *(_index(controller, upper, name, drive_unit) for name in _MACROS),
         f"#define {upper}_MEASURED_SIZE {controller.measured_size}",
         f"#define {upper}_STATE_SIZE {controller.state_size}",
         f"#define {upper}_SAMPLE_TIME_S {controller.sample_time_s!r}",
         "",
         "/* Indices into the array of parameters, which may be changed between two calls. */",
-        *(
-            f"#define {upper}_PARAMETER_{name.upper()} {place} /* {meaning} [{_in_unit(unit, drive_unit)}] */"
-            for name, (place, unit, meaning) in PARAMETERS.items()
-        ),
+        *(_parameter(controller, upper, name, drive_unit) for name in PARAMETERS),
         f"{prefix}_real *{prefix}_controller_parameters(void);",
         "",
         "/* Set the memory to zero before the first call and whenever the loop was open. */",
@@ -300,14 +351,14 @@ def _places(prefix: str) -> dict[str, int]:
     return {name.removeprefix(prefix).lower(): getattr(kernel, name) for name in names}
 
 
-def _readme(controller: Controller, prefix: str) -> str:
+def _readme(controller: Controller, prefix: str, drive_unit: str) -> str:
     upper = prefix.upper()
-    floors = (
-        f"\n- `{upper}_MEASURED_GROUND` and from `{upper}_MEASURED_FLOORS` on: absolute accelerations of the ground "
-        f"and of {controller.floors} floors [m/s2]"
-        if controller.floors
-        else ""
+    readings = "\n".join(
+        f"- `{upper}_{name}`: {meaning.replace('each floor', f'each of the {controller.floors} floors')}"
+        for name, meaning in _READINGS.items()
+        if _is_read(controller, name)
     )
+    unit = "" if drive_unit == DRIVE else f" {drive_unit}"
     hold = int(controller.layout[kernel.HOLD])
     return f"""# Controller of law {controller.law}
 
@@ -320,13 +371,10 @@ C code with them: `cc -std=c99 controller.c self_test.c -lm` builds a program th
 
 Call `{prefix}_controller_reset` once, then `{prefix}_controller_step` every {controller.sample_time_s:g} s with
 
-- `{upper}_MEASURED_DISPLACEMENT`: damper displacement [m]
-- `{upper}_MEASURED_ACCELERATION`: damper acceleration, floor less ground [m/s2]
-- `{upper}_MEASURED_VELOCITY`: damper velocity [m/s], read only where the controller was built without a filter{floors}
+{readings}
 
-and hold `command[{upper}_COMMAND_DRIVE]` (A or V, as the damper was measured) until the next call. The other entries of
-`command` are the desired force before and after clipping, the estimated motion, whether clipping and switch acted, and
-`{upper}_COMMAND_FAULT`. The damper force is positive where it resists the motion.
+in `measured`, whose other entries may be 0. Hold the drive `command[{upper}_COMMAND_DRIVE]`{unit and " in"}{unit} until
+the next call. `controller.h` lists the other entries of `command`.
 
 ## Faulty readings
 
@@ -334,7 +382,7 @@ A reading is refused if it is NaN or infinite, or larger than the largest plausi
 
 - For up to {hold} samples in a row ({1e3 * hold * controller.sample_time_s:.0f} ms) the last good reading replaces it;
   `{upper}_COMMAND_FAULT` is 1.
-- After that, and before the first good sample, the drive is {controller.options.safe_drive:g};
+- After that, and before the first good sample, the drive is {controller.options.safe_drive:g}{unit};
   `{upper}_COMMAND_FAULT` is 2.
 - At the next sample with good readings the controller starts anew, and `{upper}_COMMAND_FAULT` is 0.
 

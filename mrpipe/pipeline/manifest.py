@@ -68,6 +68,11 @@ class Manifest:
     seconds: float = 0.0
     failed: str = ""
 
+    @property
+    def has_no_key(self) -> bool:
+        """Whether the stage was skipped before it could run, so that there is nothing to compare with."""
+        return bool(self.skipped) and not (self.key.inputs or self.key.settings or self.key.code)
+
     def save(self, directory: Path) -> None:
         """Write `<directory>/<stage>.json` atomically."""
         atomic_write_text(directory / f"{self.stage}.json", json.dumps(asdict(self), indent=1))
@@ -91,10 +96,10 @@ def _adapter() -> Any:
 
 def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes) -> list[str]:
     """Return the reasons why a stage has to run; empty if the existing result can be used."""
-    if manifest is None:
-        return ["never built"]
-    if manifest.failed and manifest.skipped:
+    if manifest is not None and manifest.failed and manifest.skipped:
         return [f"the last run of it failed: {manifest.failed}"]
+    if manifest is None or manifest.has_no_key:
+        return ["never built"]
     reasons = []
     for name in sorted({*manifest.key.inputs, *key.inputs}):
         before, now = manifest.key.inputs.get(name), key.inputs.get(name)

@@ -111,7 +111,7 @@ def _control(
             controllers.measured[d],
         )  # fmt: skip
     if central.members.shape[0] > 0:
-        request_forces(controllers, central, sample)
+        request_forces(controllers, central)
     for d in range(places.shape[0] - 1):
         controller_step(
             controllers.laws[d], controllers.numbers[places[d, 0] : places[d + 1, 0]],

@@ -9,7 +9,6 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
-    COMMAND_FORCE,
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
@@ -18,6 +17,7 @@ from mrpipe.control.kernel import (
     MEASURED_VELOCITY,
     OBSERVER_FORCE,
     S_REQUEST,
+    expected_force,
 )
 from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, DRIVE, FORCE, VELOCITY, advance
 from mrpipe.simulation.implicit_force import (
@@ -317,15 +317,17 @@ def regulate(central: Central, measured: FloatArray) -> None:
 
 
 @compiled_inside
-def request_forces(controllers: Controllers, central: Central, sample: int) -> None:
+def request_forces(controllers: Controllers, central: Central) -> None:
     """Let the central regulator request the forces of its dampers.
 
-    Its observer takes the measured force of a damper or, where the controller says so, the last desired one.
+    Its observer takes the measured force of a damper or, where the controller says so, the expected one.
     """
     for index in range(central.members.shape[0]):
         d = central.members[index]
         if controllers.layouts[controllers.places[d, 1] + OBSERVER_FORCE] == 0:
-            central.forces[index] = controllers.commands[d, max(sample - 1, 0), COMMAND_FORCE]
+            central.forces[index] = expected_force(
+                controllers.numbers[controllers.places[d, 0] :], controllers.memories[controllers.places[d, 2] :]
+            )
         elif math.isfinite(controllers.measured[d, MEASURED_FORCE]):
             central.forces[index] = controllers.measured[d, MEASURED_FORCE]
     regulate(central, controllers.measured)

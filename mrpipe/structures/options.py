@@ -92,7 +92,8 @@ class DamperSettings(Section):
         ("displacement", "acceleration"),
         min_length=1,
         description="Sensors at this damper. `displacement` and `acceleration` feed the Kalman filter, `displacement` "
-        "alone gives the velocity by differences, and `velocity` is a velocity sensor.",
+        "alone gives the velocity by differences, and `velocity` is a velocity sensor. A law that reads the damper "
+        "force has a load cell.",
     )
 
 

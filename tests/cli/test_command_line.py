@@ -70,6 +70,15 @@ MISTAKES = {
         ["export", "forward", "--format", "onxx"],
         "--format: onxx: is not a format; did you mean onnx",
     ),
+    "format of a controller": (
+        ["export", "controller", "--format", "matlab"],
+        "--format: matlab: is not a format of controller; leave --format out; it is written as c and json",
+    ),
+    "format of a script": (["export", "opensees", "--format", "c"], "is not a format of opensees"),
+    "prefix of C names": (
+        ["export", "controller", "--set", "export.prefix=9x"],
+        "is '9x'; a name of letters, digits and _ expected, which does not begin with a digit",
+    ),
     "no campaign": (["prepare", "--campaign", "nowhere"], "nowhere"),
     "no file to show": (["show", "nowhere.h5"], "nowhere.h5: no such file or directory"),
     "no picture": (["show", "README.md", "--plot", "x.txt"], "end it in .png, .svg or .pdf"),

@@ -50,6 +50,12 @@ def test_times_and_speeds_follow_from_the_target_mode(thesis_frame: Frame, set_c
     assert real.extremum_step_m == pytest.approx(5.0 * 20e-6)
 
 
+def test_a_perfect_damper_has_a_load_cell(thesis_frame: Frame, set_c: DamperModel) -> None:
+    """Its force is the desired one, without a residual or a largest force."""
+    made = factory(thesis_frame, set_c, ControllerSettings(inverse="model", observer_force="expected"))
+    assert made.options().observer_force == "expected" and made.options(perfect=True).observer_force == "measured"
+
+
 def test_settings_come_before_the_calibration(thesis_frame: Frame, set_c: DamperModel) -> None:
     own = ControllerSettings(
         inverse="model",

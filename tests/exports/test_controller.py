@@ -22,7 +22,7 @@ from mrpipe.control.kernel import (
     MEASURED_VELOCITY,
 )
 from mrpipe.control.laws import law_named, law_names
-from mrpipe.control.lqg import Weights
+from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
 from tests.control.stepped import commands_of
@@ -82,19 +82,19 @@ CASES = [*((law, "table") for law in law_names()), *((law, "network") for law in
 KNOWN = {"vd": Gains(650.0), "vdns": Gains(250.0, -4500.0), "fdns": Gains(alpha_n_m=3000.0)}
 
 
-def controller_of(law: str, kind: str, frame, position, damper) -> Controller:
+def controller_of(law: str, kind: str, frame, position, damper, **more) -> Controller:
     """Return a controller that reads the motion of `recorded_signal` in all its parts."""
     entry, rate = law_named(law), 500.0 if law == "fdns" else 200.0
     plant = plant_of(frame, position, CalibrationOptions(mode=1))
     gains = KNOWN.get(law) or next(iter(entry.candidates(plant).values()), Gains())
+    bounds = {"residual_force_n": 12.0, "saturation_force_n": 40.0} if law == "fdns-bounded" else {}
     options = ControllerOptions(
         rate_hz=rate,
         drive_limit=4.0,
         bias_drift_m_s2=0.01,
         dead_band_m_s=1e-3,
         inverse_request="history",
-        residual_force_n=12.0 if law == "fdns-bounded" else 0.0,
-        saturation_force_n=40.0 if law == "fdns-bounded" else None,
+        **{**bounds, **more},
     )
     return build_controller(
         law,
@@ -143,6 +143,21 @@ def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.oracle
+def test_c_equals_python_without_a_load_cell(tmp_path, thesis_frame, floor_one, set_c):
+    bounds = {"residual_force_n": 12.0, "saturation_force_n": 40.0}
+    parts = thesis_frame, floor_one, set_c
+    controller = controller_of("lqg", "table", *parts, observer_force="expected", **bounds)
+    signal = recorded_signal(controller.measured_size, controller.options.rate_hz)
+    python, c = commands_of(controller, signal), in_c(controller, signal, tmp_path)
+    np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
+    # the reading of the force has no effect, and the bounds have one
+    signal[:, MEASURED_FORCE] = np.nan
+    np.testing.assert_array_equal(commands_of(controller, signal), python)
+    free = controller_of("lqg", "table", *parts, observer_force="expected")
+    assert not np.allclose(commands_of(free, signal)[:, COMMAND_DRIVE], python[:, COMMAND_DRIVE])
+
+
 @pytest.mark.golden
 def test_the_drive_has_the_unit_of_the_damper(set_c):
     controller = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse_table(set_c))
@@ -150,6 +165,48 @@ def test_the_drive_has_the_unit_of_the_damper(set_c):
     parameters = json.loads(files["controller.json"])["parameters"]
     assert parameters["drive_limit"]["unit"] == "V" and parameters["k_n_m"]["unit"] == "N/m"
     assert "largest drive [V]" in files["controller.h"] and "[drive]" not in "".join(files.values())
+
+
+def _files(law: str, frame, position, damper, **options) -> dict[str, str]:
+    controller = build_controller(
+        law,
+        Gains(alpha_n_m=3000.0) if law == "fdns" else Gains(),
+        ControllerOptions(drive_limit=4.0, **options),
+        inverse=inverse_table(damper),
+        observer=lqg_observer(frame, position, Weights(), 0.005),
+        position=position,
+    )
+    return controller_files(controller, "rig", {"drive_unit": "A"})
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("law", "options", "read"),
+    [
+        ("fdns", {}, ("DISPLACEMENT", "ACCELERATION")),
+        ("fdns", {"velocity": "difference"}, ("DISPLACEMENT",)),
+        ("lqg", {"velocity": "measured"}, ("DISPLACEMENT", "VELOCITY", "GROUND", "FORCE", "FLOORS")),
+        ("lqg", {"observer_force": "expected"}, ("DISPLACEMENT", "ACCELERATION", "GROUND", "FLOORS")),
+        ("energy-dissipation", {}, ("DISPLACEMENT", "ACCELERATION", "FORCE")),
+    ],
+)
+def test_readme_and_header_name_the_readings_of_the_law(law, options, read, thesis_frame, floor_one, set_c) -> None:
+    """The force of the damper had not been named, and every law had seemed to read the velocity."""
+    files = _files(law, thesis_frame, floor_one, set_c, **options)
+    for name in ("DISPLACEMENT", "ACCELERATION", "VELOCITY", "GROUND", "FORCE", "FLOORS"):
+        assert (f"- `RIG_MEASURED_{name}`" in files["README.md"]) == (name in read), name
+        line = next(row for row in files["controller.h"].splitlines() if f"RIG_MEASURED_{name} " in row)
+        assert ("not used by this controller" in line) == (name not in read), name
+
+
+@pytest.mark.golden
+def test_the_header_says_which_gains_have_no_effect(thesis_frame, floor_one, set_c) -> None:
+    lines = _files("fdns", thesis_frame, floor_one, set_c)["controller.h"].splitlines()
+    idle = {
+        name: any(f"PARAMETER_{name} " in row and "no effect" in row for row in lines)
+        for name in ("C_N_S_M", "ALPHA_N_M")
+    }
+    assert idle == {"C_N_S_M": True, "ALPHA_N_M": False}
 
 
 @pytest.mark.golden

@@ -17,7 +17,7 @@ from mrpipe.errors import StageSkipped, UserError
 from mrpipe.pipeline.code_version import code_version
 from mrpipe.pipeline.fingerprint import digest_of_artifact
 from mrpipe.pipeline.lock import run_lock
-from mrpipe.pipeline.manifest import Manifest
+from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
 from mrpipe.pipeline.parts import read_part
 from mrpipe.pipeline.stage import StageContext
 
@@ -128,6 +128,16 @@ def test_stage_without_campaign_is_skipped_with_all_after_it(make_pipeline: Make
     assert outcome.what == "skipped"
     assert "there is no frame campaign" in outcome.manifest.skipped
     assert CALLS == []
+
+
+@pytest.mark.property
+def test_a_stage_that_was_skipped_for_lack_of_data_is_called_never_built(make_pipeline: MakePipeline) -> None:
+    """It had been compared with nothing: every setting and every file of code had changed."""
+    pipeline = make_pipeline()
+    pipeline.build("after")
+    manifest = Manifest.load(pipeline.run_directory / "manifests", "shaken")
+    key = StageKey({"campaign:frame": "1"}, {"prepare": {"cutoff_hz": 100.0}}, {"mrpipe.signals": "2"}, 2011)
+    assert reasons_stale(manifest, key, pipeline.run_directory, pipeline.hashes) == ["never built"]
 
 
 @pytest.mark.property

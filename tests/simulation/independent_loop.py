@@ -211,14 +211,15 @@ def integrate(
     delay: float = 0.0,
     driver_s: float = 0.0,
     central: Central | None = None,
-    load_cells: bool = True,
+    largest_force: float | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-11,
 ) -> Histories:
     """Integrate the loop from rest; a command acts `delay` after its sample, and the first drive acts before, too.
 
-    `central` is the regulator of the dampers with the law `Requested`. It reads the forces of its dampers; without
-    `load_cells` it takes the forces that they should have had since the last sample.
+    `central` is the regulator of the dampers with the law `Requested`. It reads the forces of its dampers. With
+    `largest_force` there are no load cells: it takes the last desired force, between the switch force of the controller
+    and the largest force, in the direction of the last estimated velocity.
     """
     loop = Loop(M, C, K, devices, ground, driver_s)
     rate = devices[0].controller.rate
@@ -238,7 +239,11 @@ def integrate(
         across, parts = loop.rod_accelerations(t, y), loop.parts(y)
         if central is not None:
             readings = [*(parts[d][1] for d in regulated), *loop.floor_accelerations(t, y)[central.floors]]
-            known = np.array([parts[d][0] for d in regulated]) if load_cells else desired[regulated]
+            known = np.array([parts[d][0] for d in regulated])
+            if largest_force is not None:
+                own = [devices[d].controller for d in regulated]
+                sides = np.sign([0.0 if item.estimate is None else item.estimate[1] for item in own])
+                known = sides * np.clip(np.abs(desired[regulated]), own[0].switch, largest_force)
             wanted = central.forces(ground(t), np.array(readings), known)
             for d, force in zip(regulated, wanted, strict=True):
                 devices[d].controller.law = Requested(float(force))

@@ -43,6 +43,8 @@ FRICTION = ((4000.0, 0.05, 0.1525), (3000.0, 0.04, 0.1025))
 REGULATED = ((3e-4, 20.0), (6e-4, 30.0))
 """Weight [1/N^2] and noise [N] of the force of both."""
 ACCELEROMETERS, EXTREMUM_STEP = (0, 2), 1e-4
+LARGEST_FORCE = 60.0
+"""Largest force that the controllers expect of a damper [N]."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,7 @@ def controller_of(case: Case, d: int) -> Controller:
         rate_hz=RATE,
         velocity=case.velocity[d],  # type: ignore[arg-type]
         observer_force=case.observer_force,  # type: ignore[arg-type]
+        saturation_force_n=LARGEST_FORCE,
         residual_force_n=SWITCH,
         drive_limit=LIMIT,
         friction_rounding_m_s=rounding,
@@ -159,7 +162,7 @@ def independently(case: Case) -> Histories:
         delay=case.delay,
         driver_s=case.driver,
         central=central,
-        load_cells=case.observer_force == "measured",
+        largest_force=LARGEST_FORCE if case.observer_force == "expected" else None,
         **({"rtol": 1e-10, "atol": 1e-13} if case.perfect else {}),
     )
 
@@ -227,7 +230,7 @@ def test_the_kalman_filter_of_a_braced_damper_reads_the_acceleration_of_the_rod(
         Case(("fdns", "fdns"), brace=5e4, delay=0.003, driver=0.01),
         Case(("lqg", "lqg"), brace=5e4, delay=0.003, driver=0.01),
         Case(("fdns", "lqg")),
-        Case(("fdns", "lqg"), observer_force="desired"),
+        Case(("fdns", "lqg"), observer_force="expected"),
     ],
     ids=["fdns", "lqg", "fdns and lqg", "without a load cell"],
 )

@@ -108,7 +108,8 @@ def two_storeys(folder: Path, dampers: list[dict[str, Any]], count: int = 2, **m
 def test_exports_of_one_damper_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str) -> None:
     path = two_storeys(tmp_path, [{"between": [1, "ground"], "law": "vd"}])
     common = ["--config", str(path), "--run", str(tmp_path / "run")]
-    assert "is not supported with structure.dampers" in error_of(["export", what, *common], capsys)
+    refused = error_of(["export", what, *common], capsys)
+    assert "is not supported with structure.dampers" in refused and "calibrate.damper_floor" in refused
     assert not (tmp_path / "run").exists()
 
 

@@ -16,8 +16,8 @@ from mrpipe.control.kernel import (
     MEASURED_FORCE,
     MEASURED_GROUND,
     OBSERVER_FORCE,
-    S_FORCE,
     STATE_OBSERVER,
+    expected_force,
 )
 from mrpipe.control.law import Assessment, Plant
 
@@ -53,8 +53,8 @@ def observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: 
 
 @njit(LAW_SIGNATURE, cache=True)
 def regulator_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Return -k z; the observer takes the measured force of the damper, or the desired force of the last sample."""
-    force = measured[MEASURED_FORCE] if layout[OBSERVER_FORCE] == 1 else state[S_FORCE]
+    """Return -k z; the observer takes the measured force of the damper, or the one that is expected without a cell."""
+    force = measured[MEASURED_FORCE] if layout[OBSERVER_FORCE] == 1 else expected_force(numbers, state)
     return observe(numbers, layout, state, measured, force)
 
 
@@ -82,7 +82,9 @@ static double observe(double *state, const double *measured, double force)
 """
 
 C_BODY = """\
-    return observe(state, measured, layout[OBSERVER_FORCE] == 1 ? measured[MEASURED_FORCE] : state[S_FORCE]);
+    const double least = numbers[RESIDUAL_FORCE], largest = larger(numbers[LARGEST_FORCE], least);
+    const double expected = state[S_DIRECTION] * smaller(larger(fabs(state[S_FORCE]), least), largest);
+    return observe(state, measured, layout[OBSERVER_FORCE] == 1 ? measured[MEASURED_FORCE] : expected);
 """
 
 
