@@ -25,7 +25,12 @@ _FORMAT = re.compile(r"\(\s*(?:\d+p,?\s*)?\d*\s*[fegdi]\s*(\d+)(?:\.\d+)?\s*(?:e
 _UNIT = re.compile(
     r"(?:units?\s*[=:]\s*|\bin\s+(?:units?\s+of\s+)?)([a-z]+(?:\s*[/^*]\s*[a-z0-9]+|\.[a-z0-9]+)*)", re.IGNORECASE
 )
-_TENTH_OF_G = "g/10"
+_SHARES_OF_G = {"g/10": 0.1, "mg": 1e-3}
+"""Units that only these records use -> their value in g."""
+_PEAK_UNIT = re.compile(
+    r"(?:peak\s+acceleration|(?<!uncor)\s+max)\s*=\s*[-+.\d]+\s*([a-z]+(?:/[a-z0-9]+)*)\s*,?\s*at\b", re.IGNORECASE
+)
+"""Unit of the largest acceleration, which the header states."""
 _WIDTH = 10
 ENDINGS = (".v2", ".v2c", ".v1", ".v1c", ".raw")
 UNCORRECTED = (".v1", ".v1c", ".raw")
@@ -59,7 +64,7 @@ def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
             continue
         header = "\n".join(lines[begin:index])
         count = int(said[1])
-        factor = _factor(path, index + 1, said[3])
+        factor = _factor(path, index + 1, said[3], header)
         values, begin = _numbers(path, lines, index, count, said[3])
         name = channel_name(header)
         yield StrongMotion(
@@ -76,12 +81,16 @@ def holds_uneven_pairs(text: str) -> bool:
     return bool(_PAIRS.search(text))
 
 
-def _factor(path: Path, line: int, said: str) -> float:
-    """Return the factor from the numbers of a block to m/s^2; without a unit they are cm/s^2, as CSMIP writes them."""
-    unit = _UNIT.search(said)
+def _factor(path: Path, line: int, said: str, header: str) -> float:
+    """Return the factor from the numbers of a block to m/s^2.
+
+    Without a unit before the samples, that of the largest acceleration in the header counts, else cm/s^2, as CSMIP
+    writes accelerations.
+    """
+    unit = _UNIT.search(said) or _PEAK_UNIT.search(header)
     written = re.sub(r"\s", "", unit[1]).lower().rstrip(".") if unit else "cm/s^2"
-    if written == _TENTH_OF_G:
-        return 0.1 * conversion("g", quantity="acceleration")
+    if written in _SHARES_OF_G:
+        return _SHARES_OF_G[written] * conversion("g", quantity="acceleration")
     try:
         return conversion(written, quantity="acceleration")
     except UserError:

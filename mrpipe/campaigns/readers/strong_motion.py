@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import lzma
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -106,7 +108,8 @@ def _within(path: Path, name: Path) -> Path:
 def _peer(path: Path, name: Path, text: str) -> StrongMotion:
     record = peer.peer_record(_within(path, name), text)
     factor = conversion(record.unit, where=f"{_within(path, name)}: header", quantity="acceleration")
-    return StrongMotion(name.stem, record.samples * factor, record.interval_s, peer.is_vertical(name.stem))
+    vertical = peer.is_vertical(name.stem, record.component)
+    return StrongMotion(name.stem, record.samples * factor, record.interval_s, vertical)
 
 
 def _files(path: Path) -> list[tuple[Path, Callable[[], str]]]:
@@ -115,7 +118,13 @@ def _files(path: Path) -> list[tuple[Path, Callable[[], str]]]:
         return [(path, lambda: path.read_text(encoding="latin-1"))]
     try:
         members = _members(path, path.read_bytes())
-    except zipfile.BadZipFile as error:
+    except UserError:
+        raise
+    except RuntimeError as error:
+        # a password is wanted, or the archive is compressed by a method that Python lacks
+        problem = "is encrypted, or compressed in a way that is not read"
+        raise UserError(path, "", problem, "unpack it, and pack the records again as an ordinary zip") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, lzma.LZMAError, OSError) as error:
         raise UserError(path, "", f"is not a zip file that can be read ({error})", "download it again") from error
     corrected = [item for item in members if item[0].suffix.lower() not in UNCORRECTED]
     return [(name, partial(content.decode, "latin-1")) for name, content in sorted(corrected or members)]
