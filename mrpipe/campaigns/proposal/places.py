@@ -63,7 +63,8 @@ def place_of(location: str) -> Place:
     """Return the place that the words of a header state.
 
     The first part that names a level decides (`Roof: Base of Penthouse` is the roof). A later part overrules a number
-    if it is nothing but the ground (`2nd Floor (Ground Level)`). Distances, columns and numbers of bents are not levels.
+    if it is nothing but the ground (`2nd Floor (Ground Level)`). Distances and numbers of columns or bents are not
+    levels.
     """
     text = location.casefold()
     if _SOIL.search(text):

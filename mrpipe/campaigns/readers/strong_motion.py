@@ -16,8 +16,8 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers import geonet, peer, smc
+from mrpipe.campaigns.readers.cosmos import BLOCK_LINE, UNCORRECTED, cosmos_channels, holds_uneven_pairs
 from mrpipe.campaigns.readers.cosmos import ENDINGS as COSMOS_ENDINGS
-from mrpipe.campaigns.readers.cosmos import UNCORRECTED, cosmos_channels, holds_uneven_pairs
 from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
@@ -49,25 +49,34 @@ def read_strong_motion(path: Path) -> list[StrongMotion]:
     """
     found: list[StrongMotion] = []
     files: list[str] = []
-    uneven = False
+    others: list[tuple[Path, str]] = []
     for name, read in _files(path):
         text = read()
-        found += _channels(path, name, text)
-        files += [name.stem] * (len(found) - len(files))
-        uneven = uneven or holds_uneven_pairs(text)
-    if not found and uneven:
-        problem = "is a digitised film record: its samples are pairs of time and acceleration at uneven times"
-        raise UserError(path, "", problem, "download the corrected record (volume 2, .V2)")
+        channels = _channels(path, name, text)
+        found += channels
+        files += [name.stem] * len(channels)
+        others += [] if channels else [(name, text)]
     if not found:
-        raise UserError(
-            path,
-            "",
-            "holds no acceleration in V2, AT2, SMC or V2A form",
-            "give such a file, or a zip that contains some",
-        )
+        raise _no_acceleration(path, others)
     names = _made_different([item.name for item in found], [f" ({file})" for file in files])
     names = _made_different(names, [f" #{index + 1}" for index in range(len(names))])
     return [replace(item, name=name) for item, name in zip(found, names, strict=True)]
+
+
+def _no_acceleration(path: Path, records: Sequence[tuple[Path, str]]) -> UserError:
+    """Return the error for a file, or for the records of a zip, without a channel of acceleration."""
+    if not records:
+        problem = f"holds no file that ends in {', '.join(ending for ending in ENDINGS if ending != '.zip')}"
+        return UserError(path, "", problem, "give a zip that contains such records")
+    name, text = records[0]
+    if any(holds_uneven_pairs(other) for _, other in records):
+        problem = "is a digitised film record: its samples are pairs of time and acceleration at uneven times"
+        return UserError(_within(path, name), "", problem, "download the corrected record (volume 2, .V2)")
+    first = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    if not first:
+        return UserError(_within(path, name), "", "is empty", "download the record again")
+    problem = f"begins with {first[:40]!r}, and no line such as {BLOCK_LINE!r} follows"
+    return UserError(_within(path, name), "line 1", problem, "download the record in CSMIP or COSMOS V2 form")
 
 
 def refuse_other_records(path: Path) -> None:

@@ -28,7 +28,8 @@ def cosmos(
     rows = ["".join(f"{value:13.6f}" for value in header[at : at + 6]) for at in range(0, 100, 6)]
     samples = ["".join(f"{value:10.5f}" for value in values[at : at + 8]) for at in range(0, values.size, 8)]
     lines = ["Corrected acceleration    (Format v01.20 with 13 text lines)", *["text"] * 7]
-    lines += ["Sta Chan  3: 90 deg (Rcrdr Chan  3) Location: Roof", f"Processed: 2019, {peak}", *["text"] * 2]
+    lines += ["Sta Chan  3: 90 deg (Rcrdr Chan  3) Location: Roof", f"Processed: 2019, {peak}", "text"]
+    lines += ["Values used when parameter or data value is unknown/unspecified:   -999, -999.00"]
     lines += [" 100 Real-header values follow on 17 lines , Format = (6F13.6)", *rows]
     lines += [f"{values.size:8d} acceleration pts, approx {seconds:4d} secs{unit},Format=(8F10.5)", *samples]
     return "\n".join([*lines, "End-of-data for Chan  3 acceleration", ""])
@@ -75,6 +76,18 @@ def test_units_that_only_records_use_and_the_unit_of_the_peak(tmp_path: Path) ->
     ):
         values, _ = read(tmp_path, cosmos(SAMPLES, 5, unit=unit, peak=peak, step_ms=10.0))
         np.testing.assert_allclose(values, factor * SAMPLES, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.planted
+def test_a_sample_that_stands_for_an_unknown_value_is_refused(tmp_path: Path) -> None:
+    gap = SAMPLES.copy()
+    gap[4:7] = -999.0
+    with pytest.raises(UserError, match=r"line 31: sample 5 after it is -999\.00, .* unknown value \(3 samples\)"):
+        read(tmp_path, cosmos(gap, 5, step_ms=10.0))
+    strong = 18.5 * SAMPLES
+    strong[100] = -999.0
+    assert np.abs(strong[:90]).max() < 999.0 < np.abs(strong).max() * 1.1, "a strong record may come close to it"
+    assert read(tmp_path, cosmos(strong, 5, step_ms=10.0))[0][100] == pytest.approx(-9.99)
 
 
 def test_a_direction_of_one_letter_is_vertical() -> None:

@@ -58,3 +58,18 @@ def test_a_proposal_names_the_file_in_the_archive_and_its_line(tmp_path: Path) -
         file.writestr("station/chan001.v2", head + "  1.000000" * 8 + "\n")
     with pytest.raises(UserError, match=r"\(event\.zip: station/chan001\.v2: line 2: promises 99 values, 8 follow\)"):
         propose_campaigns(tmp_path, "building", None, tmp_path)
+
+
+def test_a_file_in_another_form_is_described(tmp_path: Path) -> None:
+    for text, words in (
+        ("* VOL1DS FILE:  1/01\nUNITS ARE SECONDS AND G/10\n  .457339E-03\n", r"line 1: begins with '\* VOL1DS FILE"),
+        ("<html>Please log in</html>", "begins with '<html>"),
+        ("\n", "is empty"),
+    ):
+        (tmp_path / "a.V1").write_text(text)
+        with pytest.raises(UserError, match=words):
+            read_strong_motion(tmp_path / "a.V1")
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as file:
+        file.writestr("spectra.V3", "spectra")
+    with pytest.raises(UserError, match=r"holds no file that ends in \.v2, .*\.at2"):
+        read_strong_motion(tmp_path / "a.zip")
