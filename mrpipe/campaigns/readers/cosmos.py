@@ -28,7 +28,8 @@ _UNIT = re.compile(
 _SHARES_OF_G = {"g/10": 0.1, "mg": 1e-3}
 """Units that only these records use -> their value in g."""
 _PEAK_UNIT = re.compile(
-    r"(?:peak\s+acceleration|(?<!uncor)\s+max)\s*=\s*[-+.\d]+\s*([a-z]+(?:/[a-z0-9]+)*)\s*,?\s*at\b", re.IGNORECASE
+    r"(?:peak\s+acceleration|(?<!uncor)(?<!\s)\s+max)\s*=\s*[-+.\d]+\s*([a-z]+(?:/[a-z0-9]+)*)\s*,?\s*at\b",
+    re.IGNORECASE,
 )
 """Unit of the largest acceleration, which the header states."""
 _WIDTH = 10

@@ -72,6 +72,7 @@ def test_units_that_only_records_use_and_the_unit_of_the_peak(tmp_path: Path) ->
         (", units=g (02)", "", 9.80665),
         ("", "Max =   -0.051 g  at  2.215 sec", 9.80665),
         ("", "Max =  -50.000 cm/sec2 at  2.215 sec", 1e-2),
+        ("", "Uncor  Max =  -0.051 g  at  2.215 sec", 1e-2),
         ("", "", 1e-2),
     ):
         values, _ = read(tmp_path, cosmos(SAMPLES, 5, unit=unit, peak=peak, step_ms=10.0))
