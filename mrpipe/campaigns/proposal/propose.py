@@ -41,6 +41,8 @@ from mrpipe.words import counted, listed, noun, some
 
 Rig = Literal["bench", "frame", "both"]
 
+_ONE_ZIP = "put the channels of a record into one zip file"
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -92,25 +94,25 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     UserError
         If the folder holds no readable data file, or none that fits the requested rig.
     """
-    paths, skipped = _data_files(folder), []
+    paths, skipped, remedies = _data_files(folder), [], []
+    kinds = f"one of {', '.join(sorted(all_readers()))}"
     files: list[FoundFile] = []
     for path in paths:
         try:
             file, columns = open_columns(path)
         except UserError as error:
             skipped.append(f"{path.relative_to(folder)}: {_reason(path, error)}")
+            remedies.append(error.remedy)
             continue
         if len(columns) < 2:
-            single = "one channel; put the channels of a record into one zip file"
-            reason = single if file.accelerations else why_no_columns(file)
+            reason = f"one channel; {_ONE_ZIP}" if file.accelerations else why_no_columns(file)
             skipped.append(f"{path.relative_to(folder)}: {reason}")
+            remedies.append(_ONE_ZIP if file.accelerations else kinds)
             continue
         files += _tests_of(path, file, columns, rig)
     if not files:
-        reason = f" ({skipped[0]})" if skipped else ""
-        raise UserError(
-            folder, "", f"holds no readable data file{reason}", f"one of {', '.join(sorted(all_readers()))}"
-        )
+        reason = f" ({skipped[0].removesuffix(f'; {_ONE_ZIP}')})" if skipped else ""
+        raise UserError(folder, "", f"holds no readable data file{reason}", remedies[0] if remedies else kinds)
     layouts = share_units([item.layout for item in files])
     files = [replace(item, layout=layout) for item, layout in zip(files, layouts, strict=True)]
     proposals = []
@@ -171,7 +173,7 @@ def _propose(
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
     unsure += _not_used(files)
-    unsure += [f"{item.path.name}: {note}" for item in files for note in item.layout.notes]
+    unsure += [f"{item.path.name}: {note}" for item in files for note in (*item.layout.notes, *item.file.notes)]
     found_tests = _bench_tests(files, folder, shared) if bench else frame_tests(files, folder, shared)
     tests, doubt = found_tests.tests, found_tests.doubt
     unsure += [*_guessed_in_tests(tests), *found_tests.notes, *([f"roles: {doubt}"] if doubt else [])]

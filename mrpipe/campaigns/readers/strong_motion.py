@@ -32,6 +32,8 @@ NOT_READ = {
     ".v1a": ("an uncorrected record of GeoNet, which is not read", "give the .V2A file of the same record"),
 }
 """Endings of files of data centres that hold no acceleration in a known form -> what they are, and a remedy."""
+_SHARED = 0.8
+"""Share of the longest channel below which the proposal says that the channels were cut."""
 DEEPEST_ARCHIVE = 3
 """Archives within archives that are opened; a download of several stations has two."""
 ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, *smc.ENDINGS, *geonet.ENDINGS, ".zip")
@@ -197,7 +199,25 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
         time_s=time_s,
         sampling_rate_hz=1.0 / float(time_s[1]),
         accelerations={item.name: not item.vertical for item in channels},
+        notes=_cut_note(channels, time_s.size * float(time_s[1])),
         aliases={number: name for number, name in zip(numbers, columns, strict=True) if numbers.count(number) == 1},
+    )
+
+
+def _cut_note(channels: Sequence[StrongMotion], shared_s: float) -> tuple[str, ...]:
+    """Return a line where the channels share clearly less time than the longest of them has."""
+    lengths = {item.name: item.acceleration_m_s2.size * item.interval_s for item in channels}
+    longest = max(lengths, key=lambda name: lengths[name])
+    if shared_s >= _SHARED * lengths[longest]:
+        return ()
+    known = all(item.start_s is not None for item in channels)
+    starts = {item.name: (item.start_s or 0.0) if known else 0.0 for item in channels}
+    last = max(starts, key=lambda name: starts[name])
+    first = min(starts, key=lambda name: starts[name] + lengths[name])
+    late = f"{last} starts last and " if len(set(starts.values())) > 1 else ""
+    return (
+        f"its channels share {shared_s:.4g} of {lengths[longest]:.4g} s, because {late}{first} ends first; if more of "
+        "the record is needed, leave such a channel out of the zip",
     )
 
 

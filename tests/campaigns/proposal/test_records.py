@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.proposal.columns import Column, Layout
+from mrpipe.campaigns.proposal.propose import propose_campaigns
 from mrpipe.campaigns.proposal.records import lay_out_record
 from mrpipe.campaigns.proposal.words import Header
 
@@ -16,8 +19,6 @@ pytestmark = pytest.mark.planted
 def layout(*names: str) -> Layout:
     """Return the layout of a record whose channels have these names; those with Up are vertical."""
     columns = [Column(name, Header("acceleration", "m/s^2", "acceleration"), np.arange(3.0)) for name in names]
-    from pathlib import Path
-
     file = DataFile(Path("a.zip"), names, dict.fromkeys, accelerations={name: ": Up" not in name for name in names})
     return lay_out_record(columns, file)
 
@@ -67,6 +68,29 @@ def test_the_first_floor_is_the_ground_where_nothing_lies_below_it() -> None:
     assert list(numbers(isolated).values()) == ["1", "2", "3"]
     alone = layout("1: N, 2nd Floor", "2: N, Roof")
     assert "ground_acceleration" not in alone.channels
+
+
+def test_a_channel_that_shortens_all_others_is_named(tmp_path: Path) -> None:
+    def channel(number: int, place: str, second: int, count: int) -> str:
+        rows = ("  1.000000  2.000000" * 4 + "\n") * (count // 8)
+        head = f"Start time:  4/26/21, 17:09:{second:02d}.0 UTC (GPS)\nChan {number}: N     Location: {place}\n"
+        return f"{head}{count} points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)\n{rows}"
+
+    for second, count, words in (
+        (14, 2000, "3: N, Free Field starts last and 1: N, 1st Floor ends"),
+        (10, 800, "3: N"),
+    ):
+        parts = [
+            channel(1, "1st Floor", 10, 1600),
+            channel(2, "Roof", 10, 1600),
+            channel(3, "Free Field", second, count),
+        ]
+        (tmp_path / "a.V2").write_text("".join(parts))
+        [found] = propose_campaigns(tmp_path, "building", None, tmp_path)
+        [line] = [item for item in found.unsure if "share" in item]
+        assert words in line and "leave such a channel out" in line
+    (tmp_path / "a.V2").write_text("".join(channel(n, p, 10, 1600) for n, p in ((1, "1st Floor"), (2, "Roof"))))
+    assert not any("share" in item for item in propose_campaigns(tmp_path, "building", None, tmp_path)[0].unsure)
 
 
 def test_the_direction_of_the_structure_counts_and_not_that_of_the_soil() -> None:

@@ -56,7 +56,15 @@ def test_a_proposal_names_the_file_in_the_archive_and_its_line(tmp_path: Path) -
     )
     with zipfile.ZipFile(tmp_path / "event.zip", "w") as file:
         file.writestr("station/chan001.v2", head + "  1.000000" * 8 + "\n")
-    with pytest.raises(UserError, match=r"\(event\.zip: station/chan001\.v2: line 2: promises 99 values, 8 follow\)"):
+    said = r"\(event\.zip: station/chan001\.v2: line 2: promises 99 values, 8 follow\); download the record again$"
+    with pytest.raises(UserError, match=said):
+        propose_campaigns(tmp_path, "building", None, tmp_path)
+    (tmp_path / "event.zip").unlink()
+    for number in (1, 2):
+        (tmp_path / f"chan00{number}.v2").write_text(head.replace("99", "32") + ("  1.000000" * 8 + "\n") * 4)
+    with pytest.raises(
+        UserError, match=r"\(chan001\.v2: one channel\); put the channels of a record into one zip file$"
+    ):
         propose_campaigns(tmp_path, "building", None, tmp_path)
 
 
