@@ -63,6 +63,8 @@ class DataFile:
     accelerations
         Columns that are known to be accelerations [m/s^2], as those of strong-motion records are: name -> whether
         horizontal.
+    notes
+        What the reader left out, one line each, for a proposal.
     separator
         Sign between a group and a column in the names, where it is not that of paths.
     """
@@ -81,6 +83,7 @@ class DataFile:
     units: Mapping[str, str] = field(default_factory=dict)
     clocks: Mapping[str, tuple[float, float, int]] = field(default_factory=dict)
     accelerations: Mapping[str, bool] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     separator: str = ""
 
     def line_of(self, sample: int) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 import mrpipe.campaigns.readers as package
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers.reader import Reader
+from mrpipe.campaigns.readers.strong_motion import refuse_other_records
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 
@@ -79,6 +80,7 @@ def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
         raise not_found(path)
     readers = all_readers()
     ending = ending_of(path)
+    refuse_other_records(path)
     if ending not in readers:
         known = ", ".join(sorted(readers))
         remedy = f"save it as {_SAVE_AS[ending]}" if ending in _SAVE_AS else f"use one of {known}"

@@ -83,7 +83,7 @@ def test_a_record_that_breaks_off(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="promises 403 values"):
         read_strong_motion(tmp_path / "a.V2")
     (tmp_path / "b.V2").write_text("nothing of the kind\n")
-    with pytest.raises(UserError, match="holds no acceleration in V2, AT2, SMC or V2A form"):
+    with pytest.raises(UserError, match=r"line 1: begins with 'nothing of the kind'.*points of accel data"):
         read_motion(tmp_path / "b.V2")
 
 
@@ -137,7 +137,7 @@ def test_units_of_cosmos_and_azimuths_of_vertical_channels(tmp_path: Path) -> No
 @pytest.mark.golden
 def test_an_uncorrected_record_and_its_numbers_without_a_format(tmp_path: Path) -> None:
     rows = "  -0.269     0.387    -0.111\n" * 10
-    (tmp_path / "a.v1").write_text(f"Sta Chan 2: 360 deg (Rcrdr Chan  2)\n30 uncor. accel. pts, approx 0 secs\n{rows}")
+    (tmp_path / "a.v1").write_text(f"Sta Chan 2: 360 deg (Rcrdr Chan  2)\n30 uncor. accel. pts, approx 1 secs\n{rows}")
     (channel,) = read_strong_motion(tmp_path / "a.v1")
     assert channel.name == "2: 360 deg"
     np.testing.assert_allclose(channel.acceleration_m_s2[:4], [-0.00269, 0.00387, -0.00111, -0.00269])

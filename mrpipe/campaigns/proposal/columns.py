@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.plausibility.reference import mean_frequency
+from mrpipe.campaigns.proposal.places import place_of
 from mrpipe.campaigns.proposal.samples import has_few_levels, motion_and_force
 from mrpipe.campaigns.proposal.words import Header, read_header, read_path, split_words
 from mrpipe.errors import UserError
@@ -63,10 +63,11 @@ class Guess:
 
 @dataclass(frozen=True)
 class Layout:
-    """The channels of a file, and the columns that are not used."""
+    """The channels of a file, the columns that are not used, and what the user should know about them."""
 
     channels: dict[str, Guess] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def rig(self) -> str:
@@ -103,9 +104,8 @@ def separator_of(file: DataFile) -> str:
 def _of_a_record(name: str) -> Header:
     """Return what the name of a channel of a strong-motion record says (`7: 90 Deg, Roof: East`); SI is known."""
     _, _, place = name.partition(":")
-    _, _, location = place.partition(",")
-    said = read_header(location)
-    return Header("acceleration", "m/s^2", "acceleration", said.floor, support=said.support)
+    said = place_of(place.partition(",")[2])
+    return Header("acceleration", "m/s^2", "acceleration", said.floor, support=said.is_soil)
 
 
 def _width(file: DataFile, name: str) -> int:
@@ -172,7 +172,7 @@ def _with_twins(channels: Mapping[str, Guess], columns: Sequence[Column]) -> dic
 def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
     """Propose the channels of a frame test; floors are numbered by the numbers in the headers, or in order."""
     channels: dict[str, Guess] = {}
-    taken = _across(file)
+    taken: set[str] = set()
     time = _by_header(columns, "time", taken) or (None if file.time_s is not None else _clock(columns))
     if time is not None:
         channels["time"] = _time_guess(time)
@@ -211,19 +211,6 @@ def _ground(group: Sequence[Column]) -> Column | None:
     return next((item for item in group if item.header.floor == 0), None) or next(
         (item for item in group if item.header.support), None
     )
-
-
-def _across(file: DataFile) -> set[str]:
-    """Return the channels of a record that are vertical, or across the direction that most of its channels have."""
-    directions = {
-        name: name.partition(":")[2].partition(",")[0].strip().casefold() if horizontal else ""
-        for name, horizontal in file.accelerations.items()
-    }
-    counts = Counter(direction for direction in directions.values() if direction)
-    most = counts.most_common(1)[0][0] if counts else ""
-    return {
-        name for name, horizontal in file.accelerations.items() if not horizontal or directions[name] not in ("", most)
-    }
 
 
 def floor_columns(columns: list[Column]) -> int:

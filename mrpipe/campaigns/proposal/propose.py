@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -27,6 +27,7 @@ from mrpipe.campaigns.proposal.columns import (
 from mrpipe.campaigns.proposal.found import FoundFile, ProposedTests, shared_channels
 from mrpipe.campaigns.proposal.frame_tests import frame_tests
 from mrpipe.campaigns.proposal.groups import groups_taken, same_length, tests_in_file
+from mrpipe.campaigns.proposal.records import lay_out_record
 from mrpipe.campaigns.proposal.roles import (
     Condition,
     condition_of,
@@ -36,9 +37,11 @@ from mrpipe.campaigns.proposal.roles import (
 from mrpipe.campaigns.proposal.text import TestText, campaign_text
 from mrpipe.campaigns.proposal.unreadable import unreadable_channels, why_no_columns
 from mrpipe.errors import UserError
-from mrpipe.words import counted, some
+from mrpipe.words import counted, listed, noun, some
 
 Rig = Literal["bench", "frame", "both"]
+
+_ONE_ZIP = "put the channels of a record into one zip file"
 
 
 @dataclass(frozen=True)
@@ -91,25 +94,25 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     UserError
         If the folder holds no readable data file, or none that fits the requested rig.
     """
-    paths, skipped = _data_files(folder), []
+    paths, skipped, remedies = _data_files(folder), [], []
+    kinds = f"one of {', '.join(sorted(all_readers()))}"
     files: list[FoundFile] = []
     for path in paths:
         try:
             file, columns = open_columns(path)
         except UserError as error:
-            skipped.append(f"{path.relative_to(folder)}: {error.problem}")
+            skipped.append(f"{path.relative_to(folder)}: {_reason(path, error)}")
+            remedies.append(error.remedy)
             continue
         if len(columns) < 2:
-            single = "one channel; put the channels of a record into one zip file"
-            reason = single if file.accelerations else why_no_columns(file)
+            reason = f"one channel; {_ONE_ZIP}" if file.accelerations else why_no_columns(file)
             skipped.append(f"{path.relative_to(folder)}: {reason}")
+            remedies.append(_ONE_ZIP if file.accelerations else kinds)
             continue
         files += _tests_of(path, file, columns, rig)
     if not files:
-        reason = f" ({skipped[0]})" if skipped else ""
-        raise UserError(
-            folder, "", f"holds no readable data file{reason}", f"one of {', '.join(sorted(all_readers()))}"
-        )
+        reason = f" ({skipped[0].removesuffix(f'; {_ONE_ZIP}')})" if skipped else ""
+        raise UserError(folder, "", f"holds no readable data file{reason}", remedies[0] if remedies else kinds)
     layouts = share_units([item.layout for item in files])
     files = [replace(item, layout=layout) for item, layout in zip(files, layouts, strict=True)]
     proposals = []
@@ -125,13 +128,20 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     return proposals
 
 
+def _reason(path: Path, error: UserError) -> str:
+    """Return why a file cannot be read, with the file in an archive and the line that are wrong."""
+    within = error.source.rpartition(f"{path.name}/")[2] if f"{path.name}/" in error.source else ""
+    return ": ".join(filter(None, (within, error.where, error.problem)))
+
+
 def _tests_of(path: Path, file: DataFile, columns: list[Column], rig: Rig | None) -> list[FoundFile]:
     """Return the tests of a file: one, or several of a bench where groups of columns are tests."""
     groups = tests_in_file(columns, separator_of(file))
     of_a_frame = bool(file.accelerations) or max(floor_columns(members) for _, members in groups) >= 2
     if rig == "frame" or (rig != "bench" and of_a_frame):
         members = same_length(columns)
-        return [FoundFile(path, file, members, lay_out_frame(members, file))]
+        layout = lay_out_record(members, file) if file.accelerations else lay_out_frame(members, file)
+        return [FoundFile(path, file, members, layout)]
     tests = []
     for group, members in groups:
         own = file.with_clock_of(item.name for item in members)
@@ -149,7 +159,7 @@ def _propose(
     files: list[FoundFile], folder: Path, name: str, bench: bool, beside: Path, skipped: Sequence[str]
 ) -> Proposal:
     shared = shared_channels(files)
-    unsure = [f"channel {key}: {guess.unsure}" for key, guess in shared.items() if guess.unsure]
+    unsure = _guessed(shared)
     if bench:
         unsure += [
             f"channel {key}: not found; write its column and unit"
@@ -163,6 +173,7 @@ def _propose(
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
     unsure += _not_used(files)
+    unsure += [f"{item.path.name}: {note}" for item in files for note in (*item.layout.notes, *item.file.notes)]
     found_tests = _bench_tests(files, folder, shared) if bench else frame_tests(files, folder, shared)
     tests, doubt = found_tests.tests, found_tests.doubt
     unsure += [*_guessed_in_tests(tests), *found_tests.notes, *([f"roles: {doubt}"] if doubt else [])]
@@ -193,6 +204,15 @@ def _propose(
     listed = tuple((item.name, ", ".join(word for word in (item.kind, item.role) if word)) for item in tests)
     varies = not bench or _drive_varies(files, tests)
     return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped), varies)
+
+
+def _guessed(channels: Mapping[str, Guess]) -> list[str]:
+    """Return a line for each doubt about the channels of the campaign; channels with the same doubt share it."""
+    found: dict[str, list[str]] = {}
+    for key, guess in channels.items():
+        if guess.unsure:
+            found.setdefault(guess.unsure, []).append(key)
+    return [f"{noun(len(keys), 'channel')} {listed(keys)}: {doubt}" for doubt, keys in found.items()]
 
 
 def _not_used(files: list[FoundFile]) -> list[str]:

@@ -30,7 +30,7 @@ _ANY_CHANNEL = re.compile(
 )
 _SEISMIC_CODE = re.compile(r"<SCNL>\s*\w+\.(\w+)\.", re.IGNORECASE)
 """Code of the channel (such as HNZ) in the comments of COSMOS: station, channel, network, location."""
-_VERTICAL = re.compile(r"\b(up|vert\w*|dn|down|ud|[a-z][hln]z)\b", re.IGNORECASE)
+_VERTICAL = re.compile(r"\b(up|vert\w*|dn|down|ud|z|v|[a-z][hln]z)\b", re.IGNORECASE)
 _STEP = re.compile(r"spaced\s+at\s+([\d.]+)\s*sec", re.IGNORECASE)
 _POINTS_RATE = re.compile(r"\bat\s+([\d.]+)\s*(?:pts|points|samples)\s*/\s*sec", re.IGNORECASE)
 _SECONDS = re.compile(r"approx\.?\s+([\d.]+)\s*sec", re.IGNORECASE)
@@ -41,7 +41,11 @@ _UP, _DOWN, _ANY_VERTICAL = 400, 401, 402
 """Azimuths that COSMOS gives to vertical channels."""
 _AZIMUTH, _RECORDED_STEP_S, _STEP_MS = 53, 33, 61
 """Places of the azimuth among the integers, and of sampling intervals among the reals of the header, from 0."""
-_RATES_HZ = (50.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0, 400.0, 500.0, 1000.0)
+_RATES_HZ = (50.0, 100.0, 120.0, 125.0, 128.0, 200.0, 240.0, 250.0, 256.0, 400.0, 500.0, 512.0, 1000.0)
+_CUT_S = 0.6
+"""Duration [s] by which a record may be shorter than COSMOS states, because it rounds or cuts to whole seconds."""
+_FIELD_WIDTH = re.compile(r"\(\s*\d*\s*[fegdi]\s*(\d+)", re.IGNORECASE)
+"""Width of a number in a Fortran format such as (6F13.6)."""
 _START = re.compile(
     r"\b(?:start|trigger)\s+time:\s*(\d+)[/-](\d+)[/-](\d+),?\s+(\d+):\s*(\d+):\s*(\d+(?:\.\d*)?)"
     r"(?:\s+([A-Z]{3})\b)?",
@@ -122,7 +126,8 @@ def interval_s(path: Path, said: str, header: str, count: int) -> float:
     """Return the sampling interval [s].
 
     CSMIP states it in the line before the samples. COSMOS states only a rounded duration there; the first interval of
-    the header that agrees with it counts, and without one the usual rate that agrees.
+    the header that agrees with it counts. Where the header leaves the interval out, the usual rate that agrees counts,
+    if it is the only one.
 
     Parameters
     ----------
@@ -136,7 +141,7 @@ def interval_s(path: Path, said: str, header: str, count: int) -> float:
     Raises
     ------
     UserError
-        If neither line nor header state an interval.
+        If neither line nor header state an interval, or if they contradict each other.
     """
     step = _STEP.search(said)
     if step and float(step[1]) > 0.0:
@@ -149,18 +154,24 @@ def interval_s(path: Path, said: str, header: str, count: int) -> float:
         raise UserError(path, "header", "states no sampling interval", "give a V2 file with `spaced at` or `approx`")
     seconds = float(length[1])
     reals = _header_values(_REAL_VALUES, header)
-    stated = [reals[_STEP_MS] * 1e-3] if len(reals) > _STEP_MS else []
+    # of these samples, then of the record before it was processed
+    own = reals[_STEP_MS] * 1e-3 if len(reals) > _STEP_MS else 0.0
+    stated = [own]
     stated += [reals[_RECORDED_STEP_S], reals[_RECORDED_STEP_S] * 1e-3] if len(reals) > _RECORDED_STEP_S else []
     stated += [1.0 / float(rate) for rate in reversed(_RATE.findall(header)) if float(rate) > 0.0]
-    # the duration is rounded or cut to whole seconds
     agrees = partial(_agrees, count=count, seconds=seconds)
-    for candidates in (
-        stated,
-        sorted((1.0 / rate for rate in _RATES_HZ), key=lambda item: abs(item * count - seconds)),
-    ):
-        if suitable := list(filter(agrees, candidates)):
-            return suitable[0]
-    return seconds / count
+    if suitable := list(filter(agrees, stated)):
+        return suitable[0]
+    about = f"{count} samples in approximately {seconds:g} s"
+    if own > 0.0:
+        problem = f"states a sampling interval of {own:g} s, but {about}"
+        raise UserError(path, f"real header {_STEP_MS + 1}", problem, "correct one of them, or download it again")
+    usual = [1.0 / rate for rate in _RATES_HZ if -_CUT_S < count / rate - seconds < 1.0 + _CUT_S]
+    if len(usual) != 1:
+        problem = f"states no sampling interval, and {about} do not determine it"
+        remedy = "write the interval in ms as this number of the header"
+        raise UserError(path, f"real header {_STEP_MS + 1}", problem, remedy)
+    return usual[0]
 
 
 def _agrees(interval: float, count: int, seconds: float) -> bool:
@@ -173,9 +184,11 @@ def _header_values(heading: re.Pattern[str], header: str) -> list[float]:
     if not found:
         return []
     count = int(found[-1][1])
+    width = _FIELD_WIDTH.search(found[-1][0])
     values: list[float] = []
     for line in header[found[-1].end() :].splitlines()[1:]:
-        numbers = row_of_numbers(line)
+        # a large number fills its columns, so that it touches the one before it
+        numbers = row_of_numbers(line, int(width[1]) if width else None)
         if numbers is None or len(values) >= count:
             break
         values += numbers

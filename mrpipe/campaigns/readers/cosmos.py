@@ -25,11 +25,21 @@ _FORMAT = re.compile(r"\(\s*(?:\d+p,?\s*)?\d*\s*[fegdi]\s*(\d+)(?:\.\d+)?\s*(?:e
 _UNIT = re.compile(
     r"(?:units?\s*[=:]\s*|\bin\s+(?:units?\s+of\s+)?)([a-z]+(?:\s*[/^*]\s*[a-z0-9]+|\.[a-z0-9]+)*)", re.IGNORECASE
 )
-_TENTH_OF_G = "g/10"
+_SHARES_OF_G = {"g/10": 0.1, "mg": 1e-3}
+"""Units that only these records use -> their value in g."""
+_PEAK_UNIT = re.compile(
+    r"(?:peak\s+acceleration|(?<!uncor)(?<!\s)\s+max)\s*=\s*[-+.\d]+\s*([a-z]+(?:/[a-z0-9]+)*)\s*,?\s*at\b",
+    re.IGNORECASE,
+)
+"""Unit of the largest acceleration, which the header states."""
 _WIDTH = 10
+BLOCK_LINE = "7500 points of accel data equally spaced at .010 sec, in cm/sec2"
+"""Line before the samples, for messages."""
 ENDINGS = (".v2", ".v2c", ".v1", ".v1c", ".raw")
 UNCORRECTED = (".v1", ".v1c", ".raw")
 """Endings of records as the instrument gave them."""
+_UNKNOWN = re.compile(r"unknown/unspecified\s*:\s*-?\d+\s*,\s*(-?\d+(?:\.\d*)?)", re.IGNORECASE)
+"""Number that stands for an unknown value, as COSMOS states it in its header."""
 _PAIRS = re.compile(r"units\s+of\s+uncor\w*\s+\w+\s+are\s+sec\s+and", re.IGNORECASE)
 
 
@@ -59,8 +69,9 @@ def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
             continue
         header = "\n".join(lines[begin:index])
         count = int(said[1])
-        factor = _factor(path, index + 1, said[3])
+        factor = _factor(path, index + 1, said[3], header)
         values, begin = _numbers(path, lines, index, count, said[3])
+        _require_known(path, index + 1, values, header)
         name = channel_name(header)
         yield StrongMotion(
             name=name.text,
@@ -76,12 +87,16 @@ def holds_uneven_pairs(text: str) -> bool:
     return bool(_PAIRS.search(text))
 
 
-def _factor(path: Path, line: int, said: str) -> float:
-    """Return the factor from the numbers of a block to m/s^2; without a unit they are cm/s^2, as CSMIP writes them."""
-    unit = _UNIT.search(said)
+def _factor(path: Path, line: int, said: str, header: str) -> float:
+    """Return the factor from the numbers of a block to m/s^2.
+
+    Without a unit before the samples, that of the largest acceleration in the header counts, else cm/s^2, as CSMIP
+    writes accelerations.
+    """
+    unit = _UNIT.search(said) or _PEAK_UNIT.search(header)
     written = re.sub(r"\s", "", unit[1]).lower().rstrip(".") if unit else "cm/s^2"
-    if written == _TENTH_OF_G:
-        return 0.1 * conversion("g", quantity="acceleration")
+    if written in _SHARES_OF_G:
+        return _SHARES_OF_G[written] * conversion("g", quantity="acceleration")
     try:
         return conversion(written, quantity="acceleration")
     except UserError:
@@ -91,6 +106,24 @@ def _factor(path: Path, line: int, said: str) -> float:
             f"gives the samples in {written}, which is not a unit of acceleration",
             "download the corrected record (volume 2), which is in cm/s^2",
         ) from None
+
+
+def _require_known(path: Path, line: int, values: FloatArray, header: str) -> None:
+    """Refuse samples that are the number which the header states for unknown values.
+
+    One such sample may be a true one in a record that comes as close to this number elsewhere.
+    """
+    stated = _UNKNOWN.search(header)
+    unknown = values == float(stated[1]) if stated else np.zeros(values.size, dtype=bool)
+    if not stated or not np.any(unknown):
+        return
+    largest = float(np.abs(values[~unknown]).max(initial=0.0))
+    if np.any(unknown[1:] & unknown[:-1]) or largest < 0.9 * abs(float(stated[1])):
+        first, count = int(np.argmax(unknown)) + 1, int(np.sum(unknown))
+        problem = (
+            f"sample {first} after it is {stated[1]}, which the header states for an unknown value ({count} samples)"
+        )
+        raise UserError(path, f"line {line}", problem, "download a record without gaps, or cut them off")
 
 
 def _numbers(path: Path, lines: list[str], index: int, count: int, said: str) -> tuple[FloatArray, int]:

@@ -11,14 +11,23 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.fortran import required_row, row_of_numbers
 from mrpipe.errors import UserError
+from mrpipe.units import same_dimension
 
 ENDINGS = (".at2",)
 
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
 _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
 _OLD_HEADER = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:E[-+]?\d+)?)\s+NPTS\s*,\s*DT", re.IGNORECASE | re.MULTILINE)
-_UNIT = re.compile(r"units?\s+of\s+([a-z]+(?:/[a-z0-9^*]+)*)", re.IGNORECASE)
-_VERTICAL = re.compile(r"(?:[-_.](?:up|ud|down|dwn|dn|ver|vert|v|z)|up|dwn|[a-z][hln]z|ver)$", re.IGNORECASE)
+_WORDS_OF_UNIT = r"([a-z]+(?:/[a-z0-9^*]+)*)"
+_UNIT = re.compile(rf"units?\s+of\s+{_WORDS_OF_UNIT}", re.IGNORECASE)
+_OTHER_UNIT = re.compile(rf"(?:\bin\s+|[(\[]\s*|units?\s*(?:are|is|[=:])\s*){_WORDS_OF_UNIT}", re.IGNORECASE)
+"""Unit as other programs state it: `Acceleration in cm/s/s`, `The units are (g)`."""
+_OTHER_QUANTITY = re.compile(r"\b(velocity|displacement)\b", re.IGNORECASE)
+_VERTICAL = re.compile(
+    r"(?:[-_.](?:up|down|dwn|ver|vert|v|z)|up|dwn|[a-z][hln]z|ver|(?<![a-z])(?:ud|dn))$", re.IGNORECASE
+)
+_VERTICAL_COMPONENT = re.compile(r"^(?:up|ud|dn|dwn|down|v|ver\w*|z|[a-z]{2}z)$", re.IGNORECASE)
+"""Component in the second line of the header, such as `KOBE 01/16/95 2046, NISHI-AKASHI, UP (CUE)`."""
 _HEADER_LINES = 2
 """The first lines are names, which may begin with a number."""
 
@@ -37,12 +46,15 @@ class PeerRecord:
         The lines before the samples.
     unit
         Unit that the header states; g where it states none, because PEER writes accelerations in g.
+    component
+        Direction that the second line states, such as `090` or `UP`; empty where it states none.
     """
 
     samples: FloatArray
     interval_s: float
     header: str
     unit: str
+    component: str = ""
 
 
 def peer_record(path: Path, text: str) -> PeerRecord:
@@ -58,7 +70,8 @@ def peer_record(path: Path, text: str) -> PeerRecord:
     Raises
     ------
     UserError
-        If the header has no NPTS and DT, a row holds other things than numbers, or NPTS is wrong.
+        If the header has no NPTS and DT or states another quantity, a row holds other things than numbers, or NPTS is
+        wrong.
     """
     # programs of DOS end a text with this character
     lines = text.replace("\x1a", "").splitlines()
@@ -86,10 +99,37 @@ def peer_record(path: Path, text: str) -> PeerRecord:
         )
     if not np.all(np.isfinite(samples)):
         raise UserError(path, "", "holds a sample that is not finite", "download the record again")
-    unit = _UNIT.search(header)
-    return PeerRecord(np.array(samples), step, header, unit[1].lower() if unit else "g")
+    component = re.sub(r"\(.*", "", lines[1]).rpartition(",")[2].strip()
+    return PeerRecord(np.array(samples), step, header, _unit(path, lines[_HEADER_LINES:first]), component)
 
 
-def is_vertical(name: str) -> bool:
-    """Return whether the name of a file without its ending says that the component is vertical, as `I-ELC-UP` does."""
-    return bool(_VERTICAL.search(name))
+def _unit(path: Path, lines: list[str]) -> str:
+    """Return the unit that the lines between the names and the samples state."""
+    text = "\n".join(lines)
+    if (other := _OTHER_QUANTITY.search(text)) and "accel" not in text.lower():
+        problem = f"says that this is not an acceleration, but a {other[1].lower()}"
+        raise UserError(path, "header", problem, "give the .AT2 file of the acceleration")
+    if unit := _UNIT.search(text):
+        return unit[1].lower()
+    stated = (found[1].lower() for found in _OTHER_UNIT.finditer(text))
+    return next((unit for unit in stated if _is_acceleration(unit)), "g")
+
+
+def _is_acceleration(unit: str) -> bool:
+    try:
+        return same_dimension(unit, "acceleration")
+    except UserError:
+        return False
+
+
+def is_vertical(name: str, component: str = "") -> bool:
+    """Return whether a component is vertical.
+
+    Parameters
+    ----------
+    name
+        Name of the file without its ending, such as `I-ELC-UP`.
+    component
+        Direction that the header states.
+    """
+    return bool(_VERTICAL.search(name) or _VERTICAL_COMPONENT.match(component))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import lzma
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -14,8 +16,8 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers import geonet, peer, smc
+from mrpipe.campaigns.readers.cosmos import BLOCK_LINE, UNCORRECTED, cosmos_channels, holds_uneven_pairs
 from mrpipe.campaigns.readers.cosmos import ENDINGS as COSMOS_ENDINGS
-from mrpipe.campaigns.readers.cosmos import UNCORRECTED, cosmos_channels, holds_uneven_pairs
 from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
@@ -30,6 +32,8 @@ NOT_READ = {
     ".v1a": ("an uncorrected record of GeoNet, which is not read", "give the .V2A file of the same record"),
 }
 """Endings of files of data centres that hold no acceleration in a known form -> what they are, and a remedy."""
+_SHARED = 0.8
+"""Share of the longest channel below which the proposal says that the channels were cut."""
 DEEPEST_ARCHIVE = 3
 """Archives within archives that are opened; a download of several stations has two."""
 ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, *smc.ENDINGS, *geonet.ENDINGS, ".zip")
@@ -47,25 +51,34 @@ def read_strong_motion(path: Path) -> list[StrongMotion]:
     """
     found: list[StrongMotion] = []
     files: list[str] = []
-    uneven = False
+    others: list[tuple[Path, str]] = []
     for name, read in _files(path):
         text = read()
-        found += _channels(path, name, text)
-        files += [name.stem] * (len(found) - len(files))
-        uneven = uneven or holds_uneven_pairs(text)
-    if not found and uneven:
-        problem = "is a digitised film record: its samples are pairs of time and acceleration at uneven times"
-        raise UserError(path, "", problem, "download the corrected record (volume 2, .V2)")
+        channels = _channels(path, name, text)
+        found += channels
+        files += [name.stem] * len(channels)
+        others += [] if channels else [(name, text)]
     if not found:
-        raise UserError(
-            path,
-            "",
-            "holds no acceleration in V2, AT2, SMC or V2A form",
-            "give such a file, or a zip that contains some",
-        )
+        raise _no_acceleration(path, others)
     names = _made_different([item.name for item in found], [f" ({file})" for file in files])
     names = _made_different(names, [f" #{index + 1}" for index in range(len(names))])
     return [replace(item, name=name) for item, name in zip(found, names, strict=True)]
+
+
+def _no_acceleration(path: Path, records: Sequence[tuple[Path, str]]) -> UserError:
+    """Return the error for a file, or for the records of a zip, without a channel of acceleration."""
+    if not records:
+        problem = f"holds no file that ends in {', '.join(ending for ending in ENDINGS if ending != '.zip')}"
+        return UserError(path, "", problem, "give a zip that contains such records")
+    name, text = records[0]
+    if any(holds_uneven_pairs(other) for _, other in records):
+        problem = "is a digitised film record: its samples are pairs of time and acceleration at uneven times"
+        return UserError(_within(path, name), "", problem, "download the corrected record (volume 2, .V2)")
+    first = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    if not first:
+        return UserError(_within(path, name), "", "is empty", "download the record again")
+    problem = f"begins with {first[:40]!r}, and no line such as {BLOCK_LINE!r} follows"
+    return UserError(_within(path, name), "line 1", problem, "download the record in CSMIP or COSMOS V2 form")
 
 
 def refuse_other_records(path: Path) -> None:
@@ -106,7 +119,8 @@ def _within(path: Path, name: Path) -> Path:
 def _peer(path: Path, name: Path, text: str) -> StrongMotion:
     record = peer.peer_record(_within(path, name), text)
     factor = conversion(record.unit, where=f"{_within(path, name)}: header", quantity="acceleration")
-    return StrongMotion(name.stem, record.samples * factor, record.interval_s, peer.is_vertical(name.stem))
+    vertical = peer.is_vertical(name.stem, record.component)
+    return StrongMotion(name.stem, record.samples * factor, record.interval_s, vertical)
 
 
 def _files(path: Path) -> list[tuple[Path, Callable[[], str]]]:
@@ -115,7 +129,13 @@ def _files(path: Path) -> list[tuple[Path, Callable[[], str]]]:
         return [(path, lambda: path.read_text(encoding="latin-1"))]
     try:
         members = _members(path, path.read_bytes())
-    except zipfile.BadZipFile as error:
+    except UserError:
+        raise
+    except RuntimeError as error:
+        # a password is wanted, or the archive is compressed by a method that Python lacks
+        problem = "is encrypted, or compressed in a way that is not read"
+        raise UserError(path, "", problem, "unpack it, and pack the records again as an ordinary zip") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, lzma.LZMAError, OSError) as error:
         raise UserError(path, "", f"is not a zip file that can be read ({error})", "download it again") from error
     corrected = [item for item in members if item[0].suffix.lower() not in UNCORRECTED]
     return [(name, partial(content.decode, "latin-1")) for name, content in sorted(corrected or members)]
@@ -179,7 +199,25 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
         time_s=time_s,
         sampling_rate_hz=1.0 / float(time_s[1]),
         accelerations={item.name: not item.vertical for item in channels},
+        notes=_cut_note(channels, time_s.size * float(time_s[1])),
         aliases={number: name for number, name in zip(numbers, columns, strict=True) if numbers.count(number) == 1},
+    )
+
+
+def _cut_note(channels: Sequence[StrongMotion], shared_s: float) -> tuple[str, ...]:
+    """Return a line where the channels share clearly less time than the longest of them has."""
+    lengths = {item.name: item.acceleration_m_s2.size * item.interval_s for item in channels}
+    longest = max(lengths, key=lambda name: lengths[name])
+    if shared_s >= _SHARED * lengths[longest]:
+        return ()
+    known = all(item.start_s is not None for item in channels)
+    starts = {item.name: (item.start_s or 0.0) if known else 0.0 for item in channels}
+    last = max(starts, key=lambda name: starts[name])
+    first = min(starts, key=lambda name: starts[name] + lengths[name])
+    late = f"{last} starts last and " if len(set(starts.values())) > 1 else ""
+    return (
+        f"its channels share {shared_s:.4g} of {lengths[longest]:.4g} s, because {late}{first} ends first; if more of "
+        "the record is needed, leave such a channel out of the zip",
     )
 
 
