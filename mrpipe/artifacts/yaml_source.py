@@ -62,7 +62,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value of the user for a message; long values are shortened."""
+    """Return a value of the user for a message, with the words of YAML; long values are shortened."""
+    if value is None:
+        return "empty"
+    if isinstance(value, bool):
+        return str(value).lower()
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**30 else "a number of more than 30 digits"
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
 
@@ -216,6 +220,8 @@ def read_yaml(path: Path) -> YamlSource:
     except UnicodeDecodeError as error:
         raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
     node, content = parse(text, path)
+    if content is None:
+        raise UserError(path, "", "is empty", "write `key: value` lines")
     if not isinstance(content, dict):
         raise UserError(path, "line 1", "is not a mapping", "write `key: value` lines")
     lines: dict[Place, int] = {}

@@ -435,7 +435,7 @@ def test_a_name_that_cannot_be_that_of_a_directory(
     config = project(tmp_path)
     config.write_text(config.read_text().replace("name: own", f"name: '{name}'"), encoding="utf-8")
     status, _, err = checked(capsys, str(config))
-    assert status == 2 and f"name: {name!r}: is not the name of a directory" in err
+    assert status == 2 and f"name, {name!r}: is not the name of a directory" in err
 
 
 @pytest.mark.golden

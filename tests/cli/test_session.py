@@ -104,6 +104,15 @@ def test_an_unknown_stage_is_named_with_its_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.property
+def test_the_report_alone_needs_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "own.yaml"
+    config.write_text("name: own\nstages: [report]\n", encoding="utf-8")
+    assert run(["run", "--config", str(config), "--run", str(tmp_path / "run")]) == 2
+    assert "own.yaml: line 2, stages: lists the report alone, and no stage has run in " in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.property
 @pytest.mark.parametrize("what", ["inverse", "damper", "frame", "controller", "all"])
 def test_an_export_without_data_changes_nothing(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = tmp_path / "own.yaml"
