@@ -32,7 +32,7 @@ LARGEST_BYTES = 20_000_000
 """Largest file."""
 
 _LONGEST_SHOWN = 80
-_TYPES = {"str", "int", "float", "bool"}
+KINDS = {"str", "int", "float", "bool"}
 """Names by which pydantic distinguishes the types of a value that may have several."""
 
 
@@ -125,7 +125,7 @@ class YamlSource:
 def _keys(model: type[BaseModel], place: Place) -> tuple[str | int, ...]:
     """Return the keys of a fault as the user writes them, without the names of the types that a value may have."""
     keys = tuple(part for part in place if part != "[key]")
-    of_union = len(keys) > 1 and keys[-1] in _TYPES and keys[-1] not in _model_at(model, keys[:-2]).model_fields
+    of_union = len(keys) > 1 and keys[-1] in KINDS and keys[-1] not in _model_at(model, keys[:-2]).model_fields
     return keys[:-1] if of_union else keys
 
 
@@ -164,6 +164,7 @@ def expected(fault: Mapping[str, Any]) -> str:
         "int_type": "a whole number expected",
         "int_from_float": "a whole number expected",
         "string_type": "a text expected" + ("" if isinstance(fault["input"], list | dict) else "; put it in quotes"),
+        "string_too_short": "a text that is not empty expected",
         "bool_parsing": "true or false expected",
         "bool_type": "true or false expected",
         "dict_type": "a mapping of keys to values expected",

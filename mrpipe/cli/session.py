@@ -212,7 +212,7 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
             outcomes = pipeline.outcomes
             pipeline.write_config()
             yield pipeline
-        except UserError:
+        except (UserError, MemoryError):
             if new:
                 _remove_without_results(new)
             elif before is not None and not any(item.what == "built" for item in outcomes.values()):

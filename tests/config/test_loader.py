@@ -37,6 +37,10 @@ FAULTS = {
     "number beyond every range": ("prepare: {cutoff_hz: 1e400}\n", "prepare.cutoff_hz: is '1e400'; a finite number"),
     "seed too large": ("seed: 9223372036854775808\n", "line 1, seed: is 9223372036854775808; a value less than or"),
     "empty section": ("prepare:\n", "line 1, prepare: is empty; a mapping of keys to values expected"),
+    "wrong end of a damper": (
+        "structure: {dampers: [{between: [1.5, ground]}]}\n",
+        "line 1, structure.dampers[0].between[0]: is 1.5; a text expected; put it in quotes",
+    ),
     "no stage": ("stages: []\n", "line 1, stages: is []; a list of at least 1 value expected"),
     "stage twice": ("stages: [prepare, assemble, prepare]\n", "prepare is listed more than once"),
     "no mapping": ("- a\n- b\n", "line 1: is not a mapping; write `key: value` lines"),
