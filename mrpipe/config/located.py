@@ -56,13 +56,17 @@ def _exists(content: Any, keys: Sequence[str | int]) -> bool:
     for key in keys:
         if isinstance(content, BaseModel) and key in type(content).model_fields:
             content = getattr(content, str(key))
-        elif (isinstance(content, Mapping) and key in content) or (
-            isinstance(content, tuple | list) and isinstance(key, int) and key < len(content)
-        ):
+        elif _holds(content, key):
             content = content[key]
         else:
             return False
     return True
+
+
+def _holds(content: Any, key: str | int) -> bool:
+    if isinstance(content, tuple | list):
+        return isinstance(key, int) and key < len(content)
+    return isinstance(content, Mapping) and key in content
 
 
 def _keys(setting: str) -> Iterator[str | int]:
