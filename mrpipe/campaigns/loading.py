@@ -374,7 +374,9 @@ def _require_floors(source: YamlSource, campaign: Campaign) -> None:
         floors = sorted({floor_of(name) or 0 for name in test.channels if name.startswith("floor_")})
         if floors and masses and len(masses) < floors[-1]:
             raise source.error(
-                ("frame", "floor_masses_kg"), f"has {len(masses)} masses", f"{floors[-1]} floors are measured"
+                ("frame", "floor_masses_kg"),
+                f"has {len(masses)} of {floors[-1]} masses",
+                "give one for each measured floor",
             )
 
 
