@@ -85,7 +85,7 @@ def identify_frame(campaign: Campaign | str | Path, **settings: Any) -> Identifi
     from mrpipe.config.sections.identify_frame import IdentifyFrameSettings
     from mrpipe.errors import UserError
     from mrpipe.modal.identify import identify_frame as identify
-    from mrpipe.modal.records import frame_tests
+    from mrpipe.modal.recordings import frame_tests
     from mrpipe.modal.storage import summary
 
     loaded = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)

@@ -203,7 +203,7 @@ def require_frame_tests(campaign: Campaign) -> None:
     UserError
         If no test shows modes, a forced test has no measured excitation, or a floor is not one of the frame.
     """
-    from mrpipe.modal.records import frame_tests
+    from mrpipe.modal.recordings import frame_tests
 
     frame_tests(campaign)
 

@@ -168,6 +168,7 @@ class ControllerFactory:
             acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
             bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
             inverse_request=settings.inverse_request,
+            observer_force=settings.observer_force,
             residual_force_n=self.switch_force_n if residual_force_n is None else residual_force_n,
             low_pass_hz=settings.cutoff_hz,
             drive_limit=limit,

@@ -48,8 +48,9 @@ class RegulatorSettings(Section):
     force_noise_n: float | None = Field(
         None,
         ge=0.0,
-        description="Difference between damper force and desired force, taken as noise; null: residual force of the "
-        "damper.",
+        description="Error of the damper force that the observer takes, as noise: the change of a measured force "
+        "within a sample, or the difference between a desired force and that of the damper; null: residual force of "
+        "the damper.",
     )
 
     def known(self) -> dict[str, float]:

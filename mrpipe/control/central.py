@@ -42,7 +42,7 @@ class Sensors:
 
 @dataclass(frozen=True)
 class CentralRegulator:
-    """Regulator z+ = F z + G f + H y with the desired forces -K z.
+    """Regulator z+ = F z + G f + H y with the desired forces -K z and the forces f of the dampers.
 
     The measurements are y = [ground acceleration, displacements of the dampers, floor accelerations].
 
@@ -80,8 +80,8 @@ def central_regulator(
     The dampers resist with forces f, so that M x'' + C x' + K x = -W f - M r x_g''. The weights of energy and of the
     top displacement, and the noise, are those of the first damper; each damper has its own weight of the force.
 
-    A damper behind a brace measures the displacement of its rod, w'x - f/k_b. The observer takes the desired force for
-    f, so that its estimate is the better the more closely the damper follows.
+    A damper behind a brace measures the displacement of its rod, w'x - f/k_b. For f the observer takes the measured
+    force of the damper, or the desired one (`observer_force` of :class:`~mrpipe.control.settings.ControllerSettings`).
 
     Parameters
     ----------
@@ -156,5 +156,6 @@ CENTRAL = Law(
     source="thesis appendix E",
     force=requested_force,
     c_body="    return state[S_REQUEST];\n",
+    needs=frozenset({"observer-force"}),
 )
 """The law of one damper under a central regulator, which writes the desired force into the controller's state."""

@@ -33,6 +33,8 @@ class ControllerOptions:
         hold this force at this speed. `history`: the forces that were desired before. A network was trained on measured
         forces, which build up over the yield displacement after a reversal, whereas a desired force jumps at a
         reversal.
+    observer_force
+        Force that the observer of `lqg` takes for that of the damper: `measured` by a load cell, or `desired`.
     residual_force_n
         Switch P2 (24): below this desired force [N] the drive is 0; 0: no switch.
     low_pass_hz
@@ -67,6 +69,7 @@ class ControllerOptions:
     acceleration_noise_m_s2: float = _SETTINGS.kalman_acceleration_noise_m_s2
     bias_drift_m_s2: float = _SETTINGS.kalman_bias_drift_m_s2
     inverse_request: Literal["steady", "history"] = _SETTINGS.inverse_request
+    observer_force: Literal["measured", "desired"] = _SETTINGS.observer_force
     residual_force_n: float = 0.0
     low_pass_hz: float | None = _SETTINGS.low_pass_hz
     drive_limit: float | None = None

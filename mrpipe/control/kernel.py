@@ -57,6 +57,7 @@ AT_LIMITS = 16  # where in `numbers` the largest plausible readings are; 0: not 
 STATE_GOOD = 17  # where in `state` the last good readings are
 CHANNELS = 18  # number of measurements
 HOLD = 19  # number of samples for which the last good reading replaces a refused one
+OBSERVER_FORCE = 20  # 1 where the observer takes the measured force of the damper, 0: the desired one
 LAYOUT_SIZE = 24
 # a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`

@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from mrpipe.control.lqg import Observer, Weights
     from mrpipe.structures import Frame
 
-Need = Literal["network", "observer", "floor-accelerations", "damper-force", "drive-limit"]
+Need = Literal["network", "observer", "floor-accelerations", "damper-force", "observer-force", "drive-limit"]
 """Needs that a law may have in addition to the motion of the damper.
 
 `network`: the trained reference network. `observer`: a state observer, which reads all accelerometers.
 `floor-accelerations`: the accelerometers of ground and floors. `damper-force`: a load cell at the damper.
+`observer-force`: the same for the observer alone, which can take the desired force in its place.
 `drive-limit`: the largest drive of the damper.
 """
 

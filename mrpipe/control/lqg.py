@@ -18,7 +18,7 @@ from mrpipe.structures import Frame, state_space
 
 @dataclass(frozen=True)
 class Observer:
-    """Observer z+ = F z + g f + H y with the desired force -k z.
+    """Observer z+ = F z + g f + H y with the desired force -k z and the force f of the damper.
 
     The measurements are y = [damper displacement, ground acceleration, floor accelerations].
 
@@ -59,7 +59,8 @@ class Weights:
     ground_noise_m_s2
         Noise of the measured ground acceleration, including model error, which excites the state [m/s^2].
     force_noise_n
-        Difference between damper force and desired force, taken as noise [N]; at least the residual force.
+        Error of the force that the observer holds over a sample, taken as noise [N]. The measured force changes within
+        the sample; a desired force also differs from that of the damper, by at least the residual force.
     displacement_noise_m, acceleration_noise_m_s2
         RMS noise of the sensors [m], [m/s^2].
     """
@@ -138,9 +139,9 @@ def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray,
 def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> Observer:
     """Return the sampled observer and its regulator for :func:`~mrpipe.control.controller.build_controller`.
 
-    The observer predicts from the measured ground acceleration and the desired force, and corrects with the
-    damper displacement and the floors' absolute accelerations. The desired damper force, positive where it resists as
-    in (4.1), is minus the force on the structure that the regulator demands.
+    The observer predicts from the measured ground acceleration and the measured force of the damper, or the desired
+    one, and corrects with the damper displacement and the floors' absolute accelerations. The desired damper force,
+    positive where it resists as in (4.1), is minus the force on the structure that the regulator demands.
     """
     Ad, Bd, C, D = _sampled(frame, position, dt)
     L = frame_observer_gain(frame, position, weights, dt)

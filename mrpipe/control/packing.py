@@ -133,6 +133,7 @@ class ControllerArrays:
         observed = 2 * floors if "observer" in law.needs else 0
         limits = _largest_readings(self.options, law, floors)
         layout = self.layout
+        layout[kernel.OBSERVER_FORCE] = int(_observer_reads_force(self.options, law))
         layout[kernel.AT_LIMITS], layout[kernel.CHANNELS] = self.at, len(limits)
         self.numbers.append(limits)
         layout[kernel.FLOORS] = floors
@@ -144,6 +145,11 @@ class ControllerArrays:
         layout[kernel.STATE_SIZE] = layout[kernel.STATE_GOOD] + len(limits)
         numbers = np.ascontiguousarray(np.concatenate(self.numbers), dtype=np.float64)
         return numbers, np.concatenate([layout, *self.networks]).astype(np.int64)
+
+
+def _observer_reads_force(options: ControllerOptions, law: Law) -> bool:
+    """Return whether the observer of the law takes the measured force of the damper in place of the desired one."""
+    return "observer-force" in law.needs and options.observer_force == "measured"
 
 
 def _largest_readings(options: ControllerOptions, law: Law, floors: int) -> FloatArray:
@@ -161,7 +167,7 @@ def _largest_readings(options: ControllerOptions, law: Law, floors: int) -> Floa
         limits[kernel.MEASURED_VELOCITY] = v
     if "floor-accelerations" in law.needs:
         limits[kernel.MEASURED_GROUND] = limits[kernel.MEASURED_FLOORS :] = a
-    if "damper-force" in law.needs:
+    if "damper-force" in law.needs or _observer_reads_force(options, law):
         limits[kernel.MEASURED_FORCE] = options.largest_force_n or _LARGEST_FORCE_N
     return limits
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control import exact
@@ -18,6 +17,7 @@ from mrpipe.control.calibration import (
     calibrate_law,
     plant_of,
 )
+from mrpipe.control.factors import LARGEST_FACTOR, best_factors
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
 from mrpipe.control.laws import law_named
@@ -27,9 +27,6 @@ from mrpipe.control.together import LinearDevice, TogetherDamping, damping_toget
 from mrpipe.control.validity import ForceDemand, force_demands, validity_warnings
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
-
-LARGEST_FACTOR = 8.0
-"""Largest factor on a gain, and inverse of the smallest factor, in the search for the gains of all dampers together."""
 
 CENTRAL_LAW = "lqg"
 """Law whose dampers share one regulator, so that no gains are calibrated here."""
@@ -103,7 +100,8 @@ def calibrate_placed(
     """Calibrate every damper alone, and then all of them together.
 
     For all dampers together, the gains are multiplied by factors that maximise the damping ratio of the target mode.
-    With several target modes, the factors maximise the smallest improvement over the gains of the single dampers.
+    With several target modes, the factors maximise the smallest improvement over the gains of the single dampers, among
+    the modes that are not critically damped.
     Nonlinear laws are replaced by their equivalents, and the inherent damping of the structure is neglected, as in the
     calibration of one damper.
 
@@ -140,11 +138,11 @@ def calibrate_placed(
         return [item for item in found if item is not None]
 
     def ratios(factors: FloatArray) -> FloatArray:
-        return damping_together(bare, devices(factors), modes).damping_ratios
+        return damping_together(bare, devices(factors), modes).effective_ratios
 
     reference = np.maximum(ratios(np.ones(len(places))), 1e-6)
     largest = np.array([_largest_factor(alone[place], alone[place].alone) for place in places])
-    factors = _best_factors(ratios, reference, largest)
+    factors = best_factors(ratios, reference, largest)
     result = list(alone)
     for place, factor in zip(places, factors, strict=True):
         item = alone[place]
@@ -200,9 +198,9 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     # the calibration of a single law does not account for a brace or for gains that the user gives
     def ratio(factors: FloatArray) -> FloatArray:
         device = found.device(law.scaled(gains, float(factors[0])))
-        return damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios
+        return damping_together(plant.bare, [device] if device else [], [damper.mode]).effective_ratios
 
-    factors = _best_factors(ratio, np.ones(1), np.array([_largest_factor(found, gains)]))
+    factors = best_factors(ratio, np.ones(1), np.array([_largest_factor(found, gains)]))
     best = law.scaled(gains, float(factors[0]))
     return replace(found, alone=best, together=best)
 
@@ -222,38 +220,6 @@ def _largest_factor(item: PlacedCalibration, gains: Gains) -> float:
     if law_named(item.damper.law).tuned_gain != "alpha_n_m":
         return LARGEST_FACTOR
     return min(LARGEST_FACTOR, max(1.0, critical_friction(item.modes) / gains.alpha_n_m))
-
-
-def _best_factors(ratios: Callable[[FloatArray], FloatArray], reference: FloatArray, largest: FloatArray) -> FloatArray:
-    """Return the factors, shape (m,), of the largest damping.
-
-    If all target modes can be overdamped, these are the smallest factors, in the ratio that was found, that damp all of
-    them critically, as for a single damper.
-
-    Parameters
-    ----------
-    ratios
-        Function from factors, shape (m,), to the damping ratios of the target modes, shape (k,).
-    reference
-        Damping ratios to which these are compared, shape (k,); the smallest quotient is maximised.
-    largest
-        Largest factors, shape (m,); the smallest ones are 1/LARGEST_FACTOR.
-    """
-    count = largest.size
-    low, high = -math.log(LARGEST_FACTOR), np.log(largest)
-    simplex = np.vstack([np.zeros(count), 0.4 * np.eye(count)])
-    simplex[simplex > high] *= -1.0
-    found = minimize(
-        lambda logarithms: -float(np.min(ratios(np.exp(logarithms)) / reference)),
-        np.zeros(count),
-        method="Nelder-Mead",
-        bounds=[(low, float(item)) for item in high],
-        options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9, "maxfev": 150 * count},
-    )
-    factors = np.asarray(np.exp(found.x))
-    if float(np.min(ratios(factors))) < exact.CRITICAL:
-        return factors
-    return factors * exact.first_critical(lambda share: float(np.min(ratios(share * factors))), 0.0, 1.0)
 
 
 def placed_validity(

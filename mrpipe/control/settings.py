@@ -45,6 +45,12 @@ class ControllerSettings(Section):
         "forces, as in (2.9); at a reversal no measured force has such a history, so that the network answers with "
         "spikes.",
     )
+    observer_force: Literal["measured", "desired"] = Field(
+        "measured",
+        description="Force that the observer of `lqg` takes for that of the damper. `measured`: the reading of a load "
+        "cell. `desired`: the last desired force, for a damper without a load cell; the estimate is wrong where the "
+        "damper cannot give this force.",
+    )
     residual_force_n: float | None = Field(
         None,
         ge=0.0,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.control.exact import CRITICAL
 from mrpipe.control.following import followed_pole
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
@@ -134,10 +135,16 @@ class TogetherDamping:
         Eigenvalue s of each target mode, shape (m,) [rad/s].
     growth_1_s
         Largest real part of all eigenvalues [1/s].
+    slowest_1_s
+        Smallest decay rate of a motion without oscillation [1/s]; infinite if there is no such motion.
+    free_rad_s
+        Angular frequency of each target mode without devices, shape (m,) [rad/s].
     """
 
     poles: ComplexArray
     growth_1_s: float
+    slowest_1_s: float
+    free_rad_s: FloatArray
 
     @property
     def stable(self) -> bool:
@@ -149,6 +156,18 @@ class TogetherDamping:
         """Damping ratio -Re s/|s| of each target mode, shape (m,); -1 for all if a mode grows."""
         ratios = np.asarray(-self.poles.real / np.maximum(np.abs(self.poles), 1e-300))
         return ratios if self.stable else np.full(ratios.shape, -1.0)
+
+    @property
+    def effective_ratios(self) -> FloatArray:
+        """Damping ratio of each target mode, shape (m,); of an overdamped mode its decay rate over its frequency.
+
+        The damping ratio of a real pole is 1, however slowly the mode returns. Its effective damping ratio is the
+        smallest decay rate of a motion without oscillation over the angular frequency without devices, at most 1. For a
+        single degree of freedom with a dashpot this is zeta - sqrt(zeta^2 - 1).
+        """
+        ratios = self.damping_ratios
+        slow = np.minimum(1.0, self.slowest_1_s / self.free_rad_s)
+        return np.where(ratios >= CRITICAL, slow, ratios)
 
 
 def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Sequence[int]) -> TogetherDamping:
@@ -174,7 +193,14 @@ def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Seque
         return eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
 
     poles = [followed_pole(upper, complex(0.0, omega[mode - 1]), slopes[mode - 1]) for mode in modes]
-    return TogetherDamping(np.array(poles, dtype=np.complex128), float(np.max(upper(1.0).real)))
+    rates = -upper(1.0).real
+    real = rates[rates >= CRITICAL * np.abs(upper(1.0))]
+    return TogetherDamping(
+        poles=np.array(poles, dtype=np.complex128),
+        growth_1_s=float(-np.min(rates)),
+        slowest_1_s=float(np.min(real)) if real.size else math.inf,
+        free_rad_s=np.array([omega[mode - 1] for mode in modes]),
+    )
 
 
 def _slopes(frame: Frame, devices: Sequence[LinearDevice]) -> list[complex]:

@@ -96,7 +96,7 @@ def identify_frame(
     Parameters
     ----------
     tests
-        See :func:`~mrpipe.modal.records.frame_tests`.
+        See :func:`~mrpipe.modal.recordings.frame_tests`.
     options
         Choices; the defaults are those of the settings.
     progress

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -25,7 +26,7 @@ from mrpipe.networks.levenberg_marquardt import fit
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
-from mrpipe.networks.stopping import StoppingRules
+from mrpipe.networks.sweep_cost import predicted_cost
 from mrpipe.networks.training import in_parallel, initial_parameters
 from mrpipe.words import duration
 
@@ -120,48 +121,85 @@ def sweep(
     """
     began = time.perf_counter()
     data = _splits(history, candidates, options, seed, normalisation)
-    digest = _digest_of(data, options, seed)
+    fits = _StoredFits(data, options, seed, _digest_of(data, options, seed), cache, jobs)
     further = crossings[1] if crossings else 0
-    kept = [_kept_file(cache, f"screen-{digest}", item) is not None for item in candidates]
-    with threadpool_limits(1):
-        rng = np.random.default_rng([seed, 3])
-        screening, refining = predicted_cost(data[0].fit, candidates, options, rng, further, kept)
-    predicted = (screening + refining) / max(1, jobs)
-    more = f" and up to {further} combinations of the best" if further else ""
-    cores = "1 free core" if jobs <= 1 else f"{jobs} free cores"
-    more += f" ({sum(kept)} screened by an earlier run)" if any(kept) else ""
-    tell(f"{len(candidates)} candidates{more} x {options.starts} starts: about {duration(predicted)} on {cores}")
+    screening, refining = _predicted(fits, candidates, further, tell)
     middle = screening / max(screening + refining, 1e-9)
-
-    def screen_all(wanted: Sequence[Candidate], text: str, part: Progress) -> list[_Fits]:
-        def screen(index: int) -> _Fits:
-            return _kept(cache, f"screen-{digest}", wanted[index], lambda: _fit_all(data, wanted[index], options, seed))
-
-        known = sum(_kept_file(cache, f"screen-{digest}", item) is not None for item in wanted)
-        return _pass(screen, len(wanted), jobs, part, text, known)
-
     share = len(candidates) / (len(candidates) + further)
-    screened = screen_all(candidates, "screened", _part(progress, 0.0, share * middle))
+    screened = fits.screened(candidates, "screened", _part(progress, 0.0, share * middle))
     every = list(candidates)
     if crossings:
         scores = {item: _mean(errors) for item, (errors, _) in zip(candidates, screened, strict=True)}
         added = [item for item in crossings[0](scores) if item not in scores]
-        screened += screen_all(added, "screened combinations", _part(progress, share * middle, middle))
+        screened += fits.screened(added, "screened combinations", _part(progress, share * middle, middle))
         every += added
     chosen = _to_refine([_mean(errors) for errors, _ in screened], len(candidates), options.refined)
-
-    def refine(place: int) -> _Fits:
-        candidate, starts = every[chosen[place]], screened[chosen[place]][1]
-        return _kept(cache, f"refine-{digest}", candidate, lambda: _fit_all(data, candidate, options, seed, starts))
-
-    known = sum(_kept_file(cache, f"refine-{digest}", every[index]) is not None for index in chosen)
-    refined = _pass(refine, len(chosen), jobs, _part(progress, middle, 1.0), "refined", known)
+    starts = [(every[index], screened[index][1]) for index in chosen]
+    refined = fits.refined(starts, _part(progress, middle, 1.0))
     after = {index: errors for index, (errors, _) in zip(chosen, refined, strict=True)}
     absent = np.full(options.starts, np.nan)
     outcomes = tuple(
         Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(every)
     )
+    predicted = (screening + refining) / max(1, jobs)
     return SweepRun(outcomes, tuple(split.held.names for split in data), predicted, time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class _StoredFits:
+    """Fits of candidates to the splits, read from the folder `cache` where an earlier run made them.
+
+    `digest` identifies everything but the candidate that determines a fit.
+    """
+
+    data: Sequence[_Data]
+    options: SweepOptions
+    seed: int
+    digest: str
+    cache: Path | None
+    jobs: int
+
+    def is_screened(self, candidate: Candidate) -> bool:
+        """Return whether an earlier run screened a candidate."""
+        return _kept_file(self.cache, f"screen-{self.digest}", candidate) is not None
+
+    def screened(self, wanted: Sequence[Candidate], text: str, progress: Progress) -> list[_Fits]:
+        """Return the fits of candidates on few rows."""
+
+        def screen(index: int) -> _Fits:
+            item = wanted[index]
+            work = partial(_fit_all, self.data, item, self.options, self.seed)
+            return _kept(self.cache, f"screen-{self.digest}", item, work)
+
+        known = sum(map(self.is_screened, wanted))
+        return _pass(screen, len(wanted), self.jobs, progress, text, known)
+
+    def refined(self, wanted: Sequence[tuple[Candidate, FloatArray]], progress: Progress) -> list[_Fits]:
+        """Return the fits of candidates on all rows, each from the parameters (starts, P) of its screening."""
+        name = f"refine-{self.digest}"
+
+        def refine(index: int) -> _Fits:
+            item, starts = wanted[index]
+            return _kept(self.cache, name, item, partial(_fit_all, self.data, item, self.options, self.seed, starts))
+
+        known = sum(_kept_file(self.cache, name, item) is not None for item, _ in wanted)
+        return _pass(refine, len(wanted), self.jobs, progress, "refined", known)
+
+
+def _predicted(
+    fits: _StoredFits, candidates: Sequence[Candidate], further: int, tell: Callable[[str], None]
+) -> tuple[float, float]:
+    """Return the predicted processor time [s] of screening and of refining, after a message on the whole sweep."""
+    kept = [fits.is_screened(item) for item in candidates]
+    with threadpool_limits(1):
+        rng = np.random.default_rng([fits.seed, 3])
+        screening, refining = predicted_cost(fits.data[0].fit, candidates, fits.options, rng, further, kept)
+    more = f" and up to {further} combinations of the best" if further else ""
+    more += f" ({sum(kept)} screened by an earlier run)" if any(kept) else ""
+    time_needed = duration((screening + refining) / max(1, fits.jobs))
+    cores = "1 free core" if fits.jobs <= 1 else f"{fits.jobs} free cores"
+    tell(f"{len(candidates)} candidates{more} x {fits.options.starts} starts: about {time_needed} on {cores}")
+    return screening, refining
 
 
 def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
@@ -262,68 +300,6 @@ def _problems(
         Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases),
         scaling.output_scale / size,
     )
-
-
-def predicted_cost(
-    history: History,
-    candidates: Sequence[Candidate],
-    options: SweepOptions,
-    rng: np.random.Generator,
-    further: int = 0,
-    kept: Sequence[bool] = (),
-) -> tuple[float, float]:
-    """Return the predicted time of screening and refining on one core [s], including `further` unknown candidates.
-
-    Candidates in `kept` have been screened by an earlier run. `rng` draws the samples on which iterations are timed.
-
-    Combinations and refined candidates are mostly in the larger half of the networks.
-    """
-    screen, refine = predicted_costs(history, candidates, options, rng)
-    upper = slice(len(screen) // 2, None)
-    typical, typical_refined = float(np.sort(screen)[upper].mean()), float(np.sort(refine)[upper].mean())
-    count = min(options.refined, len(candidates)) + min(-(-options.refined // 3), further)
-    left = screen[~np.array(kept, dtype=bool)] if len(kept) else screen
-    return float(left.sum()) + further * typical, count * typical_refined
-
-
-def predicted_costs(
-    history: History, candidates: Sequence[Candidate], options: SweepOptions, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Return the predicted times of screening and of refining each candidate on one core [s], shapes (candidates,).
-
-    A few iterations of three candidates (the smallest, a middle and the largest) are timed; the others are
-    interpolated by their number of parameters. `rng` draws the samples on which the iterations are timed.
-    """
-    sizes = np.array([candidate.parameters for candidate in candidates])
-    order = np.argsort(sizes, kind="stable")
-    probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
-    times = np.array([_iteration_seconds(candidates[probe], history.samples, options, rng) for probe in probes])
-    # early stopping saves 0 to 60 % of the iterations
-    effort = options.starts * 0.7
-    screen, refine = (np.interp(sizes, sizes[probes], column) * effort for column in times.T)
-    return screen * options.screen_iterations, refine * options.refine_iterations
-
-
-def _iteration_seconds(
-    candidate: Candidate, available: int, options: SweepOptions, rng: np.random.Generator
-) -> tuple[float, float]:
-    """Return the time of one iteration of screening and of refining [s], including the error of the held-out rows."""
-
-    def problem(rows: int) -> Problem:
-        inputs = rng.normal(size=(candidate.layers[0], min(rows, available)))
-        return Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases, single=True)
-
-    held = problem(options.held_out_rows)
-    start = rng.uniform(-0.5, 0.5, held.size)
-    rules = StoppingRules(iterations=4, held_out_failures=5)
-    seconds = []
-    for rows in (options.screen_rows, options.refine_rows):
-        fitted = problem(rows)
-        # processor time, because the load of the machine in these iterations does not predict that of later hours
-        began = time.thread_time()
-        outcome = fit(fitted, start, method=options.method, rules=rules, held_out=held)
-        seconds.append((time.thread_time() - began) / max(1, outcome.iterations))
-    return seconds[0], seconds[1]
 
 
 def _key(candidate: Candidate) -> str:

@@ -14,14 +14,7 @@ import numpy as np
 from numba import float64, int64, njit, types, void
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.control.kernel import (
-    COMMAND_DRIVE,
-    COMMAND_FORCE,
-    LAW_FUNCTION,
-    MEASURED_FLOORS,
-    S_REQUEST,
-    controller_step,
-)
+from mrpipe.control.kernel import COMMAND_DRIVE, COMMAND_FORCE, LAW_FUNCTION, MEASURED_FLOORS, controller_step
 from mrpipe.dampers.plant import (
     ACCELERATION,
     CHAIN_FUNCTIONS,
@@ -46,7 +39,7 @@ from mrpipe.simulation.several_dampers_parts import (
     I_STEPS,
     I_TRACK,
     SETTLED,
-    SETTLED_LAW,
+    SETTLED_EXACTLY,
     SLOPE,
     STATE_SIZE,
     SWEEPS,
@@ -77,7 +70,7 @@ from mrpipe.simulation.several_dampers_parts import (
     compiled_inside,
     law_force,
     read_sensors,
-    regulate,
+    request_forces,
 )
 
 
@@ -101,7 +94,7 @@ def _motion_at_start(structure: Structure, state: FloatArray) -> Motion:
             known[d, V] += structure.positions[d, floor] * state[n + floor]
     return Motion(
         known, np.zeros(k), np.zeros(k), np.zeros((k, 4)), np.zeros(k), np.zeros(k), added, np.zeros((k, 3)),
-        np.zeros((k, 8)),
+        np.zeros((k, 9)),
     )  # fmt: skip
 
 
@@ -111,18 +104,14 @@ def _control(
     accelerations: FloatArray, moved: FloatArray, ground: float,
 ) -> None:  # fmt: skip
     """Read the sensors and compute the commands of one sample."""
-    places, members = controllers.places, central.members
+    places = controllers.places
     for d in range(places.shape[0] - 1):
         read_sensors(
             accelerations, moved, positions[d], motion.known[d], ground, motion.rod[d], noise[d, sample],
             controllers.measured[d],
         )  # fmt: skip
-    if members.shape[0] > 0:
-        for index in range(members.shape[0]):
-            central.forces[index] = controllers.commands[members[index], max(sample - 1, 0), COMMAND_FORCE]
-        regulate(central.regulator, central.estimate, controllers.measured, central.forces, central.wanted)
-        for index in range(members.shape[0]):
-            controllers.memories[places[members[index], 2] + S_REQUEST] = central.wanted[index]
+    if central.members.shape[0] > 0:
+        request_forces(controllers, central, sample)
     for d in range(places.shape[0] - 1):
         controller_step(
             controllers.laws[d], controllers.numbers[places[d, 0] : places[d + 1, 0]],
@@ -209,7 +198,7 @@ def _move_freely(
         answer[4] = motion.added[1, d, d] - 1.5 * flexibility / dt
         answer[5] = motion.added[2, d, d]
         answer[6] = 2.0 * motion.forces[d] - motion.previous[d] if track == TRACK_DAMPER else motion.forces[d]
-        answer[7] = motion.known[d, SLOPE]
+        answer[7], answer[8] = motion.known[d, SLOPE], flexibility
 
 
 @compiled_inside
@@ -217,7 +206,8 @@ def _find_forces(devices: Devices, motion: Motion, controllers: Controllers, tra
     """Find the forces at the end of the step, damper by damper, until no force changes; they are in `answer[:, 6]`."""
     k = motion.forces.shape[0]
     answer, starts, states = motion.answer, devices.parameter_starts, devices.state_starts
-    settled = SETTLED_LAW if track == TRACK_LAW else SETTLED
+    exactly = track == TRACK_LAW or np.any(answer[:, 8] > 0.0)
+    settled = SETTLED_EXACTLY if exactly else SETTLED
     for _ in range(SWEEPS):
         change = 0.0
         for d in range(k):
@@ -301,7 +291,8 @@ def _assembled(
         laws, numbers, layouts, memories, places, np.zeros((k, MEASURED_FLOORS + n)), commands, np.zeros(k), np.zeros(k)
     )
     estimate, both = np.zeros(regulator[0].shape[0]), np.zeros((2, members.shape[0]))
-    return structure, devices, controllers, Central(regulator, members, estimate, both[0], both[1])
+    readings = np.zeros(regulator[4].shape[0])
+    return structure, devices, controllers, Central(regulator, members, estimate, readings, both[0], both[1])
 
 
 @compiled_inside

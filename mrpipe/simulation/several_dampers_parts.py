@@ -9,12 +9,15 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
+    COMMAND_FORCE,
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
     MEASURED_FORCE,
     MEASURED_GROUND,
     MEASURED_VELOCITY,
+    OBSERVER_FORCE,
+    S_REQUEST,
 )
 from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, DRIVE, FORCE, VELOCITY, advance
 from mrpipe.simulation.implicit_force import (
@@ -33,8 +36,16 @@ compiled_inside = njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=Tru
 
 TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
 SWEEPS = 40
-SETTLED, SETTLED_LAW = 1e-6, 1e-10
-"""Relative change of the forces between iterations at which a step ends, with dampers and with linear laws."""
+SETTLED, SETTLED_EXACTLY = 1e-6, 1e-10
+"""Relative change of the forces between iterations at which a step ends: with dampers, and with linear laws or braces.
+"""
+EXACT_N, EXACT, EXACT_ITERATIONS = 1e-10, 1e-12, 8
+"""Difference of answer and guess at which the search for the force of a damper behind a brace ends [N], the same as a
+share of the answer, and the iterations after which the usual tolerance is sufficient.
+
+The acceleration of the rod is a second difference of the force over the stiffness of the brace. It contains an error of
+the force 9/(4 k_b dt^2) times, so that the usual tolerance makes it useless in short steps.
+"""
 
 # --- integers of the run ---
 I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
@@ -141,11 +152,25 @@ class Controllers(NamedTuple):
 
 
 class Central(NamedTuple):
-    """The central regulator: its matrices and sensors, the numbers of its dampers, its estimate and its forces [N]."""
+    """The central regulator of some of the dampers.
+
+    Attributes
+    ----------
+    regulator
+        F, G, H, K of :class:`~mrpipe.control.central.CentralRegulator`, and for each sensor the number of the damper
+        (of all dampers) and the channel, shape (p, 2).
+    members
+        Numbers of its dampers.
+    estimate, readings
+        Estimated state, and last good reading of each sensor.
+    forces, wanted
+        Forces of its dampers that the observer takes, and forces that it requests [N].
+    """
 
     regulator: Any
     members: IntArray
     estimate: FloatArray
+    readings: FloatArray
     forces: FloatArray
     wanted: FloatArray
 
@@ -171,7 +196,7 @@ class Motion(NamedTuple):
     free
         Displacement, velocity and acceleration at the end of the step without the forces there, shape (k, 3).
     answer
-        Arguments of `chain_force` for each damper, shape (k, 8).
+        Arguments of `chain_force` for each damper, shape (k, 9).
     """
 
     known: FloatArray
@@ -201,11 +226,13 @@ def chain_force(
     """Return the force of a damper at the end of a step, by a secant within a bracket; `trial` becomes its state.
 
     `motion` holds displacement, velocity and acceleration without the force, what one newton adds to each, the first
-    guess of the force, and the slope of the damper's answer that the step before ended with.
+    guess of the force, the slope of the damper's answer that the step before ended with, and the flexibility of the
+    brace.
     """
     guess, slope = motion[6], motion[7]
     found, last_guess, last_found = guess, 0.0, 0.0
     low, high = -math.inf, math.inf
+    braced = motion[8] > 0.0
     for iteration in range(ITERATIONS):
         # written out, because a function with these arrays counts the references to them in each iteration
         for index in range(before.shape[0]):
@@ -216,13 +243,14 @@ def chain_force(
         wire[DRIVE] = device[CURRENT]
         advance(functions, parameters, parameter_offsets, state_offsets, trial, wire, dt)
         found = wire[FORCE]
-        if settled(found, guess):
+        exactly = braced and iteration < EXACT_ITERATIONS
+        if settled(found, guess) and (not exactly or abs(found - guess) <= EXACT_N + EXACT * abs(found)):
             motion[7] = slope
             return found
         if iteration > 0 and guess != last_guess:
             # before the last correction, because a brace makes the slope steep and different from step to step
             slope = slope_between(found, guess, last_found, last_guess)
-        if nearly_settled(found, guess):
+        if nearly_settled(found, guess) and not exactly:
             motion[7] = slope
             return secant(found, guess, slope)
         low, high = narrowed(low, high, found, guess)
@@ -274,19 +302,32 @@ def read_sensors(
 
 
 @njit(cache=True)
-def regulate(
-    regulator: Any, estimate: FloatArray, measured: FloatArray, forces: FloatArray, wanted: FloatArray
-) -> None:  # fmt: skip
-    """Advance the observer of the central regulator and put the forces for the coming sample into `wanted`.
+def regulate(central: Central, measured: FloatArray) -> None:
+    """Advance the observer of the central regulator and put the forces for the coming sample into `central.wanted`.
 
-    `regulator` holds F, G, H, K and the sensors: the number of the damper (of all dampers) and the channel of each.
+    A missing reading is replaced by the last good one.
     """
-    F, G, H, K, sensors = regulator
-    following = F @ estimate + G @ forces
+    F, G, H, K, sensors = central.regulator
     for row in range(sensors.shape[0]):
         reading = measured[int(sensors[row, 0]), int(sensors[row, 1])]
         if math.isfinite(reading):
-            for index in range(following.shape[0]):
-                following[index] += H[index, row] * reading
-    estimate[:] = following
-    wanted[:] = -(K @ estimate)
+            central.readings[row] = reading
+    central.estimate[:] = F @ central.estimate + G @ central.forces + H @ central.readings
+    central.wanted[:] = -(K @ central.estimate)
+
+
+@compiled_inside
+def request_forces(controllers: Controllers, central: Central, sample: int) -> None:
+    """Let the central regulator request the forces of its dampers.
+
+    Its observer takes the measured force of a damper or, where the controller says so, the last desired one.
+    """
+    for index in range(central.members.shape[0]):
+        d = central.members[index]
+        if controllers.layouts[controllers.places[d, 1] + OBSERVER_FORCE] == 0:
+            central.forces[index] = controllers.commands[d, max(sample - 1, 0), COMMAND_FORCE]
+        elif math.isfinite(controllers.measured[d, MEASURED_FORCE]):
+            central.forces[index] = controllers.measured[d, MEASURED_FORCE]
+    regulate(central, controllers.measured)
+    for index in range(central.members.shape[0]):
+        controllers.memories[controllers.places[central.members[index], 2] + S_REQUEST] = central.wanted[index]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.modal.identify import identify_frame
-    from mrpipe.modal.records import frame_tests
+    from mrpipe.modal.recordings import frame_tests
     from mrpipe.modal.storage import summary, write_identification
     from mrpipe.reporting import identify_frame as section
 

@@ -9,7 +9,7 @@ import pytest
 
 from mrpipe.campaigns import load_campaign, require_varying
 from mrpipe.errors import UserError
-from mrpipe.modal.records import frame_tests
+from mrpipe.modal.recordings import frame_tests
 from tests.campaigns.builders import CHANNELS, campaign, content, motion, write_csv
 
 

@@ -68,6 +68,18 @@ def test_a_dashpot_behind_its_brace_moves_less_than_both_together() -> None:
 
 
 @pytest.mark.property
+@pytest.mark.parametrize("zeta", [0.4, 1.0, 1.5, 3.0])
+def test_the_effective_damping_ratio_falls_beyond_critical_damping(zeta: float) -> None:
+    """The poles of x'' + 2 zeta w x' + w^2 x are w (-zeta +- sqrt(zeta^2 - 1))."""
+    mass, stiffness = 20.0, 3.0e4
+    frame = shear_frame([mass], [stiffness], np.zeros(1), name="one storey", source="test")
+    found = damping_together(frame, [LinearDevice(np.ones(1), 2.0 * zeta * math.sqrt(mass * stiffness))], [1])
+    expected = zeta if zeta < 1.0 else zeta - math.sqrt(zeta**2 - 1.0)
+    assert found.effective_ratios[0] == pytest.approx(expected, rel=1e-6)
+    assert found.damping_ratios[0] == pytest.approx(min(zeta, 1.0), rel=1e-6)
+
+
+@pytest.mark.property
 def test_a_damper_alone_has_the_gains_of_the_calibration_of_one_damper() -> None:
     placed = calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "vdns")], CalibrationOptions())
     single = calibrate(FRAME, FIRST, CalibrationOptions(), [law_named("vdns")])

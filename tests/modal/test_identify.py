@@ -11,7 +11,8 @@ from mrpipe.errors import UserError
 from mrpipe.modal.identification import GivenShapes
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
+from mrpipe.modal.recordings import frame_tests
+from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.modal.storage import summary
 from mrpipe.structures import (
     complex_modes,

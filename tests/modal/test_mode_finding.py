@@ -8,7 +8,7 @@ import pytest
 
 from mrpipe.modal.mode_finding import find_modes
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.records import frame_tests
+from mrpipe.modal.recordings import frame_tests
 from mrpipe.modal.search.selection import Layout
 from mrpipe.structures import complex_modes
 from tests.modal.rig import Rig, campaign_of, full_set, random_frame

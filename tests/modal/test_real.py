@@ -13,7 +13,7 @@ import pytest
 from mrpipe.campaigns import load_campaign
 from mrpipe.modal.clocks.delays import corrected, expected_clocks
 from mrpipe.modal.identify import identify_frame
-from mrpipe.modal.records import frame_tests
+from mrpipe.modal.recordings import frame_tests
 from mrpipe.modal.verification import compare_in_time
 
 

@@ -12,7 +12,8 @@ from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.findings import choose, findings, score
 from mrpipe.networks.held_out import extreme_motions, folds, motions, splits
 from mrpipe.networks.options import SweepOptions
-from mrpipe.networks.sweep import Outcome, _kept, predicted_costs, sweep
+from mrpipe.networks.sweep import Outcome, _kept, sweep
+from mrpipe.networks.sweep_cost import predicted_costs
 from tests.networks.rig import bench_history
 
 CENTRE = Candidate(("velocity",), 3, (6, 6), False)

@@ -191,7 +191,8 @@ class Central:
     """One LQG regulator for several dampers: f = -R^-1 B'P z with an observer that predicts one sample.
 
     At a sample it knows the ground acceleration, the displacements of its dampers, and the absolute accelerations of
-    some floors. The forces that its dampers should have had since the last sample count as those of the coming one.
+    some floors. The forces that its dampers have at this sample, or should have had since the last one, count as those
+    of the coming one.
 
     The cost is the integral of twice the energy of the structure plus the sum of R f^2. The observer assumes noise of
     the ground acceleration, of the forces, of each velocity (`model_noise` of that of the ground), and of its sensors.
@@ -241,7 +242,7 @@ class Central:
         self.z, self.floors = np.zeros(2 * n), list(floors)
 
     def forces(self, ground: float, readings: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Return the forces for this sample; `last` are those that the dampers should have had since the last one."""
+        """Return the forces for this sample; `last` are those that count as the forces of the coming one."""
         innovation = readings - self.C @ self.z - self.D @ last
         self.z = self.Ad @ self.z + self.Bd @ np.concatenate([[ground], last]) + self.L @ innovation
         return np.asarray(-self.K @ self.z)

@@ -211,12 +211,14 @@ def integrate(
     delay: float = 0.0,
     driver_s: float = 0.0,
     central: Central | None = None,
+    load_cells: bool = True,
     rtol: float = 1e-8,
     atol: float = 1e-11,
 ) -> Histories:
     """Integrate the loop from rest; a command acts `delay` after its sample, and the first drive acts before, too.
 
-    `central` is the regulator of the dampers with the law `Requested`.
+    `central` is the regulator of the dampers with the law `Requested`. It reads the forces of its dampers; without
+    `load_cells` it takes the forces that they should have had since the last sample.
     """
     loop = Loop(M, C, K, devices, ground, driver_s)
     rate = devices[0].controller.rate
@@ -236,7 +238,8 @@ def integrate(
         across, parts = loop.rod_accelerations(t, y), loop.parts(y)
         if central is not None:
             readings = [*(parts[d][1] for d in regulated), *loop.floor_accelerations(t, y)[central.floors]]
-            wanted = central.forces(ground(t), np.array(readings), desired[regulated])
+            known = np.array([parts[d][0] for d in regulated]) if load_cells else desired[regulated]
+            wanted = central.forces(ground(t), np.array(readings), known)
             for d, force in zip(regulated, wanted, strict=True):
                 devices[d].controller.law = Requested(float(force))
         answers = [

@@ -21,6 +21,7 @@ from mrpipe.simulation.several_dampers_parts import (
     D_K,
     D_SIZE,
     STATE_SIZE,
+    Central,
     F,
     V,
     X,
@@ -73,21 +74,21 @@ def test_faulty_readings_repeat_or_vanish() -> None:
     assert math.isnan(measured[MEASURED_VELOCITY]) and measured[MEASURED_DISPLACEMENT] == 0.003
 
 
-def test_theregulate_observer_is_its_equation_and_skips_missing_readings() -> None:
+def test_the_observer_is_its_equation_and_replaces_missing_readings_by_the_last_good_ones() -> None:
+    """A missing reading had counted as a reading of 0."""
     rng = np.random.default_rng(2)
     F_, G, H, K = (rng.standard_normal(shape) for shape in ((4, 4), (4, 2), (4, 2), (2, 4)))
     sensors = np.array([[0.0, MEASURED_DISPLACEMENT], [1.0, MEASURED_FLOORS + 1.0]])
-    measured, forces, before = (
-        rng.standard_normal((2, MEASURED_FLOORS + 2)),
-        rng.standard_normal(2),
-        rng.standard_normal(4),
+    measured = rng.standard_normal((2, MEASURED_FLOORS + 2))
+    good = np.array([measured[0, MEASURED_DISPLACEMENT], measured[1, MEASURED_FLOORS + 1]])
+    central = Central(
+        (F_, G, H, K, sensors), np.arange(2), rng.standard_normal(4), np.zeros(2), rng.standard_normal(2), np.zeros(2)
     )
-    readings = np.array([measured[0, MEASURED_DISPLACEMENT], measured[1, MEASURED_FLOORS + 1]])
     for missing in (False, True):
         if missing:
-            measured[1, MEASURED_FLOORS + 1], readings[1] = math.nan, 0.0
-        estimate, wanted = before.copy(), np.zeros(2)
-        regulate((F_, G, H, K, sensors), estimate, measured, forces, wanted)
-        expected = F_ @ before + G @ forces + H @ readings
-        assert estimate == pytest.approx(expected)
-        assert wanted == pytest.approx(-K @ expected)
+            measured[1, MEASURED_FLOORS + 1] = math.nan
+            measured[0, MEASURED_DISPLACEMENT] = good[0] = 3.0
+        expected = F_ @ central.estimate + G @ central.forces + H @ good
+        regulate(central, measured)
+        assert central.estimate == pytest.approx(expected)
+        assert central.wanted == pytest.approx(-K @ expected)

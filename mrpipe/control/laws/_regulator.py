@@ -13,7 +13,9 @@ from mrpipe.control.kernel import (
     LAW_SIGNATURE,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
+    MEASURED_FORCE,
     MEASURED_GROUND,
+    OBSERVER_FORCE,
     S_FORCE,
     STATE_OBSERVER,
 )
@@ -22,7 +24,7 @@ from mrpipe.control.law import Assessment, Plant
 
 @njit(float64(float64[::1], int64[::1], float64[::1], float64[::1], float64), cache=True)
 def observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray, force: float) -> float:
-    """Advance the observer with the damper force [N] since the last sample, and return -k z.
+    """Advance the observer with the damper force [N] that is held over the coming sample, and return -k z.
 
     `y` is the damper displacement, the ground acceleration and the absolute acceleration of each floor.
     """
@@ -51,8 +53,9 @@ def observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: 
 
 @njit(LAW_SIGNATURE, cache=True)
 def regulator_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Return -k z, assuming that the force of the damper was the desired force of the last sample."""
-    return observe(numbers, layout, state, measured, state[S_FORCE])
+    """Return -k z; the observer takes the measured force of the damper, or the desired force of the last sample."""
+    force = measured[MEASURED_FORCE] if layout[OBSERVER_FORCE] == 1 else state[S_FORCE]
+    return observe(numbers, layout, state, measured, force)
 
 
 C_OBSERVE = """\
@@ -78,7 +81,9 @@ static double observe(double *state, const double *measured, double force)
 }
 """
 
-C_BODY = "    return observe(state, measured, state[S_FORCE]);\n"
+C_BODY = """\
+    return observe(state, measured, layout[OBSERVER_FORCE] == 1 ? measured[MEASURED_FORCE] : state[S_FORCE]);
+"""
 
 
 def regulator_assessment(plant: Plant, gain: FloatArray) -> Assessment:

@@ -13,7 +13,7 @@ LAW = Law(
     force=regulator_force,
     c_body=C_BODY,
     c_helpers=C_OBSERVE,
-    needs=frozenset({"observer", "floor-accelerations"}),
+    needs=frozenset({"observer", "floor-accelerations", "observer-force"}),
     assess=lambda plant, _: regulator_assessment(
         plant, frame_regulator_gain(plant.frame, plant.position, plant.weights)
     ),

@@ -50,6 +50,8 @@ def simulate_modes(  # type: ignore[no-untyped-def]
     samples, modes = forces.shape
     position = initial[:, 0].copy()
     velocity = initial[:, 1].copy()
+    # frequency, damping ratio, damped frequency, and decay, cosine and sine over one step
+    values = np.zeros((modes, 6))
     for k in range(samples):
         whole = 0.0
         for r in range(modes):
@@ -57,10 +59,17 @@ def simulate_modes(  # type: ignore[no-untyped-def]
         whole = np.sqrt(whole)
         amplitude[k] = whole
         for r in range(modes):
-            own = whole if total else np.sqrt(position[r] ** 2 + (velocity[r] / laws[r, 0]) ** 2)
-            level = np.log1p(own / laws[r, 4])
-            omega = laws[r, 0] * np.exp(-laws[r, 2] * level)
-            zeta = min(laws[r, 1] * np.exp(laws[r, 3] * level), _LARGEST_DAMPING)
+            if k == 0 or laws[r, 2] != 0.0 or laws[r, 3] != 0.0:
+                own = whole if total else np.sqrt(position[r] ** 2 + (velocity[r] / laws[r, 0]) ** 2)
+                level = np.log1p(own / laws[r, 4])
+                omega = laws[r, 0] * np.exp(-laws[r, 2] * level)
+                zeta = min(laws[r, 1] * np.exp(laws[r, 3] * level), _LARGEST_DAMPING)
+                damped = omega * np.sqrt(1.0 - zeta**2)
+                values[r, 0], values[r, 1], values[r, 2] = omega, zeta, damped
+                values[r, 3] = np.exp(-zeta * omega * dt)
+                values[r, 4], values[r, 5] = np.cos(damped * dt), np.sin(damped * dt)
+            omega, zeta, damped = values[r, 0], values[r, 1], values[r, 2]
+            decay, cosine, sine = values[r, 3], values[r, 4], values[r, 5]
             displacement[k, r] = position[r]
             acceleration[k, r] = forces[k, r] - 2.0 * zeta * omega * velocity[r] - omega**2 * position[r]
             if k == samples - 1:
@@ -69,9 +78,6 @@ def simulate_modes(  # type: ignore[no-untyped-def]
             # particular solution of the ramp: constant + linear
             linear = slope / omega**2
             constant = (forces[k, r] - 2.0 * zeta * omega * linear) / omega**2
-            damped = omega * np.sqrt(1.0 - zeta**2)
-            decay = np.exp(-zeta * omega * dt)
-            cosine, sine = np.cos(damped * dt), np.sin(damped * dt)
             x0, v0 = position[r] - constant, velocity[r] - linear
             position[r] = decay * (x0 * cosine + (v0 + zeta * omega * x0) / damped * sine) + constant + linear * dt
             velocity[r] = decay * (v0 * cosine - (zeta * omega * v0 + omega**2 * x0) / damped * sine) + linear

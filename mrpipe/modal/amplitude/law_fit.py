@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -59,9 +60,42 @@ class _Record:
         self.target = target / self.scale
         self.input_spectra = self.spectra(self.inputs)
         self.initial = np.zeros((model.modes, 2))
+        # the derivative with respect to a parameter of one mode needs the other modes again and again
+        self._column = lru_cache(maxsize=4 * model.modes)(self._simulated_column)
 
     def spectra(self, histories: FloatArray) -> ComplexArray:
         return np.asarray(np.fft.rfft(histories * self.counts[:, None], axis=0)[self.lines])
+
+    def simulated(self, laws: AmplitudeLaws) -> Motion:
+        """Return the motion of the modes in this test."""
+        return simulated(laws, self.forces, self.dt, self.initial)
+
+    def mode_columns(self, laws: AmplitudeLaws) -> ModeSpectra:
+        """Return the spectra of the modes; modes do not depend on each other unless a law has the whole motion."""
+        if laws.measure == "motion":
+            return self._spectra_of(self.simulated(laws))
+        columns = [
+            self._column(mode, tuple(map(float, row)), tuple(map(float, initial)))
+            for mode, (row, initial) in enumerate(zip(laws.rows(), self.initial, strict=True))
+        ]
+        displacement, acceleration = zip(*columns, strict=True)
+        return np.hstack(displacement), np.hstack(acceleration)
+
+    def _simulated_column(self, mode: int, row: tuple[float, ...], initial: tuple[float, ...]) -> ModeSpectra:
+        law = AmplitudeLaws("mode", *np.array(row)[:, None])
+        return self._spectra_of(simulated(law, self.forces[:, mode : mode + 1], self.dt, np.array([initial])))
+
+    def _spectra_of(self, motion: Motion) -> ModeSpectra:
+        kinds = self.test.is_displacement
+        none = np.zeros((0, motion.displacement.shape[1]), dtype=np.complex128)
+        return (
+            self.spectra(motion.displacement) if any(kinds) else none,
+            none if all(kinds) else self.spectra(motion.acceleration),
+        )
+
+
+ModeSpectra = tuple[ComplexArray, ComplexArray]
+"""Displacement and acceleration of modes, each of shape (lines, r); no lines where no sensor measures it."""
 
 
 @dataclass(frozen=True)
@@ -109,13 +143,9 @@ class _Problem:
 
     def bases(self, laws: AmplitudeLaws, record: _Record) -> tuple[ComplexArray, ComplexArray]:
         """Return the columns for displacements and for accelerations of a record, each of shape (lines, r + k)."""
-        motion = _simulated_record(laws, record)
-        none = np.zeros((0, 0), dtype=np.complex128)
-        kinds = record.test.is_displacement
-        return (
-            np.hstack([record.spectra(motion.displacement), record.input_spectra]) if any(kinds) else none,
-            none if all(kinds) else np.hstack([record.spectra(motion.acceleration), record.input_spectra]),
-        )
+        first, second = record.mode_columns(laws)
+        inputs = record.input_spectra
+        return np.hstack([first, inputs[: len(first)]]), np.hstack([second, inputs[: len(second)]])
 
     def solve(self, theta: FloatArray) -> tuple[FloatArray, list[ComplexArray]]:
         """Return coefficients, shape (sensors, r + k), and the relative error spectra of each record."""
@@ -347,7 +377,7 @@ def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArra
     The smallest is the amplitude below which the records contain 5 % of the energy of the mode; below it the signal is
     mostly noise.
     """
-    motions = [_simulated_record(laws, record) for record in problem.records]
+    motions = [record.simulated(laws) for record in problem.records]
     own = np.abs(np.concatenate([item.displacement for item in motions]))
     if laws.measure == "motion":
         amplitude = np.concatenate([item.amplitude for item in motions])[:, None] * np.ones(own.shape[1])
@@ -358,7 +388,3 @@ def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArra
     first = np.argmax(energy >= _LEAST_ENERGY * energy[-1], axis=0)
     place = np.take_along_axis(order, first[None], axis=0)
     return np.take_along_axis(amplitude, place, axis=0)[0], np.asarray(amplitude.max(axis=0))
-
-
-def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
-    return simulated(laws, record.forces, record.dt, record.initial)

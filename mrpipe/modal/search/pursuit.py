@@ -22,6 +22,8 @@ _TRIAL_DAMPING = (0.003, 0.006, 0.012)
 """
 _LEAST_LINES = 12
 _NEIGHBOURS = 3
+_LEAST_INDEPENDENCE = 1e-8
+"""Least part of a unit column that the columns before it do not explain; below it a column adds nothing."""
 _HALF_WIDTHS = 6.0
 """A pole is judged by the lines within this number of half-power half-widths."""
 
@@ -60,9 +62,9 @@ def _residuals(fit: MultiModeFit) -> list[ComplexArray]:
     return list(np.split(whole, edges))
 
 
-def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, zeta: float) -> float:
-    """Return the improvement of the criterion by a pole, from the lines around it."""
-    half = _half_width(omega, zeta, _line(fit))
+def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, zeta: float, line: float) -> float:
+    """Return the improvement of the criterion by a pole, from the lines around it; `line` is their distance [rad/s]."""
+    half = _half_width(omega, zeta, line)
     pairs = [
         _between(item, residual, omega - half, omega + half)
         for item, residual in zip(fit.spectra, residuals, strict=True)
@@ -77,32 +79,44 @@ def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, ze
     known = [problem.mode_columns(float(fit.angular_frequencies[i]), float(fit.damping_ratios[i])) for i in near]
     smooth = np.concatenate([item.input_columns(problem.inputs) for item, _ in pairs])
     own = problem.mode_columns(omega, zeta)
-    basis = _unit(stack(np.hstack([*known, smooth])))
-    width = own.shape[1]
-    if target.shape[0] < basis.shape[1] + 3 * width:
+    inputs, width = len(problem.inputs), own.shape[1]
+    basis = [*known, smooth]
+    known_width = sum(item.shape[1] for item in basis)
+    if target.shape[0] < known_width + 3 * width:
         return -np.inf
-    q = np.linalg.qr(basis)[0]
-    before = target - q @ (q.T @ target)
-    # in a long record the transients of a weak mode are below the noise, so that they need no parameters
-    driven = own[:, : 2 * len(problem.inputs)]
-    # a mode has a real shape where damping is proportional and the clocks agree: one parameter for each sensor
-    real = driven[:, ::2]
-    return max(_improvement(before, _unit(stack(columns)), q) for columns in (real, driven, own))
+    # a mode has a real shape where damping is proportional and the clocks agree: one parameter for each sensor; in a
+    # long record the transients of a weak mode are below the noise, so that they need no parameters
+    driven = own[:, : 2 * inputs]
+    columns = np.hstack([*basis, driven[:, ::2], driven[:, 1::2], own[:, 2 * inputs :]])
+    return _improvement(target, _unit(stack(columns)), known_width, (inputs, 2 * inputs, width))
 
 
-def _improvement(before: FloatArray, added: FloatArray, q: FloatArray) -> float:
-    """Return the improvement of the information criterion by columns that are added to a basis q."""
-    added = added - q @ (q.T @ added)
-    left, singular, _ = np.linalg.svd(added, full_matrices=False)
-    left = left[:, singular > 1e-8]
-    after = before - left @ (left.T @ before)
+def _improvement(target: FloatArray, columns: FloatArray, known: int, counts: Sequence[int]) -> float:
+    """Return the largest improvement of the information criterion by columns after the first `known` ones.
+
+    The first 1, 2, ... of the further columns are tried together, as `counts` says. One orthogonal basis serves all of
+    them, because each set contains the one before.
+    """
+    q, r = np.linalg.qr(columns)
+    independent = np.abs(np.diag(r)) > _LEAST_INDEPENDENCE
+    independent[:known] = True
+    if not independent.all():
+        # the basis vector of a dependent column is arbitrary, and so would be those after it
+        q = np.zeros_like(columns)
+        q[:, independent] = np.linalg.qr(columns[:, independent])[0]
+    before = target - q[:, :known] @ (q[:, :known].T @ target)
+    explained = np.cumsum(np.square(q[:, known:].T @ before), axis=0)
     # each sensor has its own local noise, because noise of the excitation is larger at a resonance
-    first, second = np.sum(before**2, axis=0), np.sum(after**2, axis=0)
+    first = np.sum(before**2, axis=0)
     seen = first > 0.0
-    count = before.shape[0]
-    likelihood = float(np.sum(count * np.log(first[seen] / np.maximum(second[seen], 1e-12 * first[seen]))))
-    parameters = int(left.shape[1]) * int(seen.sum()) + 2
-    return likelihood - parameters * float(np.log(count * int(seen.sum())))
+    rows, sensors = before.shape[0], int(seen.sum())
+    gains = []
+    for count in counts:
+        second = np.maximum(first - explained[count - 1], 1e-12 * first)[seen]
+        likelihood = float(np.sum(rows * np.log(first[seen] / second)))
+        parameters = int(independent[known : known + count].sum()) * sensors + 2
+        gains.append(likelihood - parameters * float(np.log(rows * sensors)))
+    return max(gains)
 
 
 def _unit(columns: FloatArray) -> FloatArray:
@@ -153,14 +167,14 @@ def sets_of_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: in
 
 def _tried(fit: MultiModeFit, band_rad_s: tuple[float, float]) -> list[HiddenPole]:
     """Return a pole at each frequency of a fine grid that is not at a known mode."""
-    residuals = _residuals(fit)
+    residuals, line = _residuals(fit), _line(fit)
     tried: list[HiddenPole] = []
     for zeta in _TRIAL_DAMPING:
         steps = int(np.log(band_rad_s[1] / band_rad_s[0]) / zeta)
         for omega in np.geomspace(*band_rad_s, max(steps, 2)):
             distance = np.abs(fit.angular_frequencies - omega)
             if np.all(distance > np.maximum(fit.damping_ratios * fit.angular_frequencies, 0.002 * omega)):
-                tried.append(HiddenPole(float(omega), zeta, _gain(fit, residuals, float(omega), zeta)))
+                tried.append(HiddenPole(float(omega), zeta, _gain(fit, residuals, float(omega), zeta, line)))
     return tried
 
 

@@ -98,7 +98,7 @@ def _is_forced(test: Recording) -> bool:
 def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) -> Frame:
     from mrpipe.modal.identify import identify_frame
     from mrpipe.modal.options import IdentificationOptions
-    from mrpipe.modal.records import frame_tests
+    from mrpipe.modal.recordings import frame_tests
 
     # one direction of a structure: its channels have no suffix, so that positions and inertias of plates do not apply
     declared = dict(campaign.declared)

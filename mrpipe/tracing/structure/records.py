@@ -15,7 +15,7 @@ from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import CAMPAIGN_FILE, Campaign, Recording
 from mrpipe.campaigns.parts import in_unbroken_parts
 from mrpipe.errors import UserError
-from mrpipe.modal.records import is_input, require_signal
+from mrpipe.modal.recordings import is_input, require_signal
 
 FASTEST_HZ = 250.0
 """Numerical technique: records are decimated to about this rate unless the caller gives another."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -103,53 +103,76 @@ def trace_structure(
     declared = [effects[name] for name in names if name in effects]
     library = [item for item in effects.values() if item not in declared]
     by_direction, findings = _by_direction(campaigns, options.fit_rate_hz, progress)
-    parts: list[Part] = []
     frames: dict[str, FrameTracing] = {}
     for axis, data in by_direction.items():
         findings += [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
         findings += data.notes
         if all(item.role == "validation" for item in data.records):
             continue
-        frame = trace_frame(
+        frames[axis] = trace_frame(
             data, library, declared, options, rules.frame, rules.validation, most=options.most_effects,
             draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
-        frames[axis] = frame
-        parts.append(Part(f"frame {axis}".strip(), frame.summary))
-        findings += [f"direction {axis}: {line}" if axis else line for line in _lines(frame, rules.frame)]
-        if axis and parts[-1].unexplained:
-            findings.append(f"direction {axis} has an unexplained part, which coupling with other directions may cause")
-    data = next(iter(by_direction.values()))
-    found = [
-        command_part(data.loops, effects, names, rules.delay, options.most_confidence),
+        findings += _findings(frames[axis], axis, rules.frame)
+    parts: list[Part | None] = [_part_of(frame, axis) for axis, frame in frames.items()]
+    loops = next(iter(by_direction.values())).loops
+    parts.append(command_part(loops, effects, names, rules.delay, options.most_confidence))
+    parts.append(
         damper_part(
-            data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rules, rng=rng, jobs=jobs,
+            loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rules, rng=rng, jobs=jobs,
             progress=progress,
-        ),
-    ]  # fmt: skip
-    parts += [item for item in found if item is not None]
-    if not parts:
+        )
+    )  # fmt: skip
+    found = [item for item in parts if item is not None]
+    if not found:
         raise UserError(
             campaign.file, "tests", "no test can be judged, because floors or drive are missing",
             "record the acceleration of every floor; or damper_force, drive and the motion of floor 1",
         )  # fmt: skip
-    summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
-    if directions := [axis for axis in frames if axis]:
-        coupled = all(frames[axis].problem.training[0].record.turns for axis in directions)
-        said = TURNING if coupled else UNCOUPLED
-        summary["directions"] = {"traced": directions, "coupling_modelled": coupled, "statement": said}
-        findings.append(said)
-        if any("damper_force" in test.channels for item in campaigns for test in item.recordings):
-            findings.append("the damper is not traced, because the sensors of the structure measure in directions")
+    summary = {"campaign": campaign.name, **merged(found), "declared_effects": list(names)}
+    about, said = _on_directions(frames, campaigns)
+    return _with_drawings(StructureTracing(summary | about, findings=findings + said), frames)
+
+
+def _part_of(frame: FrameTracing, axis: str) -> Part:
+    return Part(f"frame {axis}".strip(), frame.summary)
+
+
+def _findings(frame: FrameTracing, axis: str, rules: FrameRules) -> list[str]:
+    """Return the findings on the frame in one direction, which is named if there are several."""
+    if not axis:
+        return _lines(frame, rules)
+    found = [f"direction {axis}: {line}" for line in _lines(frame, rules)]
+    if _part_of(frame, axis).unexplained:
+        found.append(f"direction {axis} has an unexplained part, which coupling with other directions may cause")
+    return found
+
+
+def _on_directions(
+    frames: Mapping[str, FrameTracing], campaigns: Sequence[Campaign]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what the summary says of several directions, and the findings; nothing if there is one direction."""
+    directions = [axis for axis in frames if axis]
+    if not directions:
+        return {}, []
+    coupled = all(frames[axis].problem.training[0].record.turns for axis in directions)
+    said = TURNING if coupled else UNCOUPLED
+    findings = [said]
+    if any("damper_force" in test.channels for item in campaigns for test in item.recordings):
+        findings.append("the damper is not traced, because the sensors of the structure measure in directions")
+    return {"directions": {"traced": directions, "coupling_modelled": coupled, "statement": said}}, findings
+
+
+def _with_drawings(traced: StructureTracing, frames: Mapping[str, FrameTracing]) -> StructureTracing:
+    """Return the tracing with the histories of all directions; its drawings show the one that decides the verdict."""
     if not frames:
-        return StructureTracing(summary, findings=findings)
+        return traced
     histories = {
         f"{axis}/{key}".strip("/"): item for axis, frame in frames.items() for key, item in _histories(frame).items()
     }
-    # the drawings show the direction that decides the verdict
-    axis = summary["part"].removeprefix("frame").strip()
+    axis = traced.summary["part"].removeprefix("frame").strip()
     drawn = frames.get(axis, next(iter(frames.values())))
-    return StructureTracing(summary, histories, _maps(drawn), _shown(drawn), findings)
+    return replace(traced, histories=histories, maps=_maps(drawn), shown=_shown(drawn))
 
 
 def _lines(frame: FrameTracing, rules: FrameRules) -> list[str]:

@@ -11,6 +11,7 @@ from mrpipe.control.controller import Controller
 from mrpipe.control.kernel import (
     COMMAND_AMPLITUDE,
     COMMAND_DRIVE,
+    COMMAND_FORCE,
     COMMAND_UNCLIPPED,
     COMMAND_VELOCITY,
     MEASURED_FLOORS,
@@ -80,6 +81,19 @@ def test_clipped_optimal_switches_by_force_feedback(thesis_frame, floor_one):
     on = ((wanted - f) * f > 0.0).astype(float)
     assert 0.05 < on.mean() < 0.95
     np.testing.assert_array_equal(found[:, COMMAND_DRIVE], LIMIT * on)
+
+
+@pytest.mark.literature
+@pytest.mark.parametrize("observer_force", ["measured", "desired"])
+def test_lqg_observes_with_the_measured_force_or_the_last_desired_one(thesis_frame, floor_one, observer_force):
+    """Thesis (E.8): the observer takes the force that acts on the structure, which a load cell measures."""
+    found = run(controller("lqg", observer_force=observer_force))
+    f = SIGNAL[:, MEASURED_FORCE]
+    if observer_force == "desired":
+        f = np.concatenate([[0.0], found[:-1, COMMAND_FORCE]])
+    wanted = observed(lqg_observer(thesis_frame, floor_one, Weights(), DT), f)
+    assert 0.02 < np.mean(found[:, COMMAND_FORCE] == 0.0) < 0.95
+    np.testing.assert_allclose(found[:, COMMAND_UNCLIPPED], wanted, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.literature

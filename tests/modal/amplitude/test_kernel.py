@@ -64,3 +64,14 @@ def test_the_amplitude_of_the_whole_motion_counts_where_it_is_asked_for() -> Non
     # the small mode feels the large one only through the amplitude of the whole motion
     assert crossings[1] < 0.85 * crossings[0]
     assert amplitude[0] == pytest.approx(np.hypot(1e-6, 0.03))
+
+
+def test_laws_that_hardly_change_are_the_limit_of_constant_laws() -> None:
+    forces = np.random.default_rng(2).standard_normal((SIZE, 2))
+    initial = np.array([[0.01, 0.0], [0.0, 0.02]])
+    constant = _simulated(forces, _laws(0.0, 0.0), initial=initial)
+    # one mode of each kind shows that a constant mode does not take the values of its neighbour
+    mixed = _laws(0.0, 0.0)
+    mixed[1, 2:4] = 1e-13
+    for expected, found in zip(constant, _simulated(forces, mixed, initial=initial), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())

@@ -15,7 +15,8 @@ from mrpipe.modal.matrices.added_mass import modal_scale
 from mrpipe.modal.matrices.masses import masses_by_orthogonality
 from mrpipe.modal.matrices.scaling import find_scale
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.records import FrameTest, FrameTests, Place, Sensor, frame_tests
+from mrpipe.modal.recordings import frame_tests
+from mrpipe.modal.records import FrameTest, FrameTests, Place, Sensor
 from mrpipe.modal.search.selection import Layout
 from tests.modal.towers import Sensors, Tower, ambient_test, forced_test, random_tower
 

@@ -18,7 +18,8 @@ from mrpipe.modal.matrices.rigid_floors import (
     measured_rows,
     rigid_response,
 )
-from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
+from mrpipe.modal.recordings import frame_tests
+from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.modal.storage import summary, write_identification
 from mrpipe.modal.verification import compare_in_time
 from mrpipe.structures import Frame, modal_damping_matrix, read_frame

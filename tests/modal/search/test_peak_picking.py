@@ -9,7 +9,8 @@ import pytest
 
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.records import FrameTest, frame_tests
+from mrpipe.modal.recordings import frame_tests
+from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search.peak_picking import transfer_functions
 from mrpipe.structures import frame_from_parameter_set, modal_assurance, natural_modes
 from tests.modal.rig import Rig, campaign_of, full_set

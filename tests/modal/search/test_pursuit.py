@@ -80,3 +80,25 @@ def test_a_weak_mode_is_supported_because_its_shape_is_real() -> None:
     fit = fit_modes(spectra, omega[known], zeta[known], passes=2, evaluations=6)
     [found] = hidden_poles(fit, (0.93 * omega[missing], 1.07 * omega[missing]), 3)
     assert found.angular_frequency == pytest.approx(omega[missing], rel=0.01)
+
+
+@pytest.mark.oracle
+def test_the_improvement_is_that_of_the_best_set_of_columns_by_least_squares() -> None:
+    rng = np.random.default_rng(7)
+    columns = rng.standard_normal((60, 7))
+    # a column that depends on those before explains nothing and counts as no parameter
+    columns[:, 5] = columns[:, 3] - 2.0 * columns[:, 4]
+    columns /= np.linalg.norm(columns, axis=0)
+    for weights in (np.eye(7)[3], np.eye(7)[4], np.eye(7)[6], np.zeros(7)):
+        target = 4.0 * (columns @ weights)[:, None] + rng.standard_normal((60, 3))
+        target[:, 2] = 0.0
+        gains = []
+        for count in (1, 3, 4):
+            errors = [
+                np.sum(np.square(target - basis @ np.linalg.lstsq(basis, target, rcond=1e-10)[0]), axis=0)[:2]
+                for basis in (columns[:, :3], columns[:, : 3 + count])
+            ]
+            independent = np.linalg.matrix_rank(columns[:, : 3 + count]) - 3
+            likelihood = 60.0 * np.sum(np.log(errors[0] / errors[1]))
+            gains.append(likelihood - (2 * independent + 2) * np.log(120.0))
+        assert pursuit._improvement(target, columns, 3, (1, 3, 4)) == pytest.approx(max(gains), rel=1e-9)

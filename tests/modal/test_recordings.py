@@ -10,7 +10,8 @@ import pytest
 
 from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
-from mrpipe.modal.records import Place, frame_test, frame_tests
+from mrpipe.modal.recordings import frame_test, frame_tests
+from mrpipe.modal.records import Place
 
 pytestmark = pytest.mark.property
 
