@@ -160,3 +160,22 @@ def test_fault_of_settings_laid_over_names_their_file(tmp_path: Path) -> None:
     assert str(caught.value).startswith(f"{over}: line 4, laboratory.bench.tests[0].motion: is 'sinus'")
     with pytest.raises(UserError, match=r"--settings: nowhere\.yaml: no such file"):
         load_config(path, [], [Path("nowhere.yaml")])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("prepare: {cutoff_hz: 1,5}\n", "some.yaml: line 1, prepare[5]: 5 is a number in place of a name"),
+        ("prepare: {cutof_hz: 1}\n", "some.yaml: line 1, prepare.cutof_hz: unknown key"),
+        ("export: {prefix: 3x}\n", "some.yaml: line 1, export.prefix: is '3x'; a text of the form ^[A-Za-z_]"),
+        ("name: a\n", "config.yaml: line 1, prepare.order: is 'x'; a whole number expected"),
+    ],
+)
+def test_a_fault_is_named_in_the_file_that_has_it(content: str, said: str, tmp_path: Path) -> None:
+    config, overlay = tmp_path / "config.yaml", tmp_path / "some.yaml"
+    wrong = "x" if "config.yaml" in said else "4"
+    config.write_text(f"prepare: {{order: {wrong}}}\n", encoding="utf-8")
+    overlay.write_text(content, encoding="utf-8")
+    with pytest.raises(UserError) as refused:
+        load_config(config, [], [overlay])
+    assert said in str(refused.value)
