@@ -155,3 +155,11 @@ def test_an_export_of_everything_names_what_is_wrong_with_the_campaign(
     assert run(["export", "all", "--config", str(config), "--run", str(tmp_path / "run")]) == 2
     error = capsys.readouterr().err
     assert "'NN': is not a unit" in error and "needs two drives" not in error
+
+
+@pytest.mark.property
+def test_a_run_for_which_the_memory_is_too_small_leaves_no_new_directory(tmp_path: Path) -> None:
+    options = CommonOptions(config=project(tmp_path), run=tmp_path / "run", quiet=True)
+    with pytest.raises(MemoryError), session(options):
+        raise MemoryError
+    assert not (tmp_path / "run").exists()
