@@ -19,13 +19,15 @@ def _kinds(annotation: Any) -> set[Any]:
 
 
 class Section(BaseModel):
-    """A group of settings: unknown keys are refused, values are checked and frozen, every field is described.
+    """A group of settings: unknown keys are refused, values are checked, finite and frozen, every field is described.
 
     A field's name carries its unit as a suffix (`cutoff_hz`); its description is what `mrpipe check --explain` prints
     and what the documentation quotes.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=False, allow_inf_nan=False
+    )
 
     @field_validator("*", mode="before")
     @classmethod

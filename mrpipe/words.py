@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+HUGE_RATIO = 1e6
+"""Ratio from which a percentage has an exponent, because nobody counts so many digits."""
+
 
 def listed(names: Sequence[str]) -> str:
     """Return `a`, `a and b`, `a, b and c`; empty without names."""
@@ -102,4 +105,7 @@ def in_percent(
     if digits is not None:
         shown = f"{100.0 * ratio:.{digits}g}" if exact else number(100.0 * ratio, digits)
         return shown if shown == "-" else f"{'+' if signed and ratio > 0.0 else ''}{shown} %"
-    return f"{100.0 * ratio:{'+' if signed else ''}.{decimals}f} %"
+    sign = "+" if signed else ""
+    if abs(ratio) >= HUGE_RATIO:
+        return f"{100.0 * ratio:{sign}.2e} %"
+    return f"{100.0 * ratio:{sign}.{decimals}f} %"

@@ -56,6 +56,14 @@ def test_an_exact_percentage_has_no_zeros_at_its_end() -> None:
     assert in_percent(None) == "-" and in_percent(None, digits=2) == "-"
 
 
+def test_a_huge_percentage_has_an_exponent() -> None:
+    assert [in_percent(-12345.678), in_percent(3.2e300, 1), in_percent(2e6, signed=True)] == [
+        "-1234568 %",
+        "3.20e+302 %",
+        "+2.00e+08 %",
+    ]
+
+
 def test_percentages() -> None:
     assert [in_percent(0.934), in_percent(-0.05, 1), in_percent(0.5, signed=True)] == ["93 %", "-5.0 %", "+50 %"]
 

@@ -7,6 +7,7 @@ from mrpipe.artifacts.resources import (
     config_directory,
     load_parameter_set,
     public_data_directory,
+    require_parameter_set,
 )
 from mrpipe.artifacts.types import BoolArray, FloatArray, IntArray, Progress, no_progress
 
@@ -25,5 +26,6 @@ __all__ = [
     "load_parameter_set",
     "no_progress",
     "public_data_directory",
+    "require_parameter_set",
     "sha256_of",
 ]

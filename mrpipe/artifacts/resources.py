@@ -13,6 +13,7 @@ import numpy as np
 from mrpipe.artifacts.types import FloatArray
 from mrpipe.artifacts.yaml_source import YamlSource, read_yaml, shown
 from mrpipe.errors import UserError
+from mrpipe.words import shortest
 
 
 def config_directory() -> Path:
@@ -100,6 +101,32 @@ def load_parameter_set(kind: str, name: str | Path) -> ParameterSet:
         units={str(key): str(entry["unit"]) for key, entry in content["parameters"].items()},
         notes=str(content.get("notes", "")),
     )
+
+
+def require_parameter_set(kind: str, name: str, setting: str, others: str = "") -> None:
+    """Refuse the name of a parameter set that is not there.
+
+    Parameters
+    ----------
+    kind, name
+        As in :func:`load_parameter_set`.
+    setting
+        Setting that gives the name, for the message.
+    others
+        What else the setting may be, such as `identified`.
+
+    Raises
+    ------
+    UserError
+        If there is no such set, or its file is wrong.
+    """
+    try:
+        load_parameter_set(kind, name)
+    except UserError as error:
+        if "no such parameter set" not in error.problem:
+            raise
+        remedy = f"{f'{others}, ' if others else ''}a YAML file, or one of the {error.remedy}"
+        raise UserError(setting, "", f"no such {kind.removesuffix('s')} {shortest(name)!r}", remedy) from None
 
 
 def _in_si(file: YamlSource, key: str, entry: Any) -> FloatArray:

@@ -32,7 +32,7 @@ LARGEST_BYTES = 20_000_000
 """Largest file."""
 
 _LONGEST_SHOWN = 80
-_TYPES = {"str", "int", "float", "bool"}
+KINDS = {"str", "int", "float", "bool"}
 """Names by which pydantic distinguishes the types of a value that may have several."""
 
 
@@ -62,7 +62,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value of the user for a message; long values are shortened."""
+    """Return a value of the user for a message, with the words of YAML; long values are shortened."""
+    if value is None:
+        return "empty"
+    if isinstance(value, bool):
+        return str(value).lower()
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**30 else "a number of more than 30 digits"
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
 
@@ -121,7 +125,7 @@ class YamlSource:
 def _keys(model: type[BaseModel], place: Place) -> tuple[str | int, ...]:
     """Return the keys of a fault as the user writes them, without the names of the types that a value may have."""
     keys = tuple(part for part in place if part != "[key]")
-    of_union = len(keys) > 1 and keys[-1] in _TYPES and keys[-1] not in _model_at(model, keys[:-2]).model_fields
+    of_union = len(keys) > 1 and keys[-1] in KINDS and keys[-1] not in _model_at(model, keys[:-2]).model_fields
     return keys[:-1] if of_union else keys
 
 
@@ -147,6 +151,8 @@ def expected(fault: Mapping[str, Any]) -> str:
         close = difflib.get_close_matches(str(fault["input"]), words, n=1, cutoff=0.5)
         hint = f"did you mean {close[0]}? " if close else ""
         return f"{hint}{context['expected']} expected"
+    if kind == "string_pattern_mismatch":
+        return f"a text of the form {context['pattern']} expected"
     if kind == "too_long":
         return f"a list of at most {context['max_length']} values expected"
     if kind == "too_short":
@@ -161,6 +167,7 @@ def expected(fault: Mapping[str, Any]) -> str:
         "int_type": "a whole number expected",
         "int_from_float": "a whole number expected",
         "string_type": "a text expected" + ("" if isinstance(fault["input"], list | dict) else "; put it in quotes"),
+        "string_too_short": "a text that is not empty expected",
         "bool_parsing": "true or false expected",
         "bool_type": "true or false expected",
         "dict_type": "a mapping of keys to values expected",
@@ -217,6 +224,8 @@ def read_yaml(path: Path) -> YamlSource:
     except UnicodeDecodeError as error:
         raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
     node, content = parse(text, path)
+    if content is None:
+        raise UserError(path, "", "is empty", "write `key: value` lines")
     if not isinstance(content, dict):
         raise UserError(path, "line 1", "is not a mapping", "write `key: value` lines")
     lines: dict[Place, int] = {}

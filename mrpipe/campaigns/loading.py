@@ -11,7 +11,7 @@ import numpy as np
 
 from mrpipe import units
 from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.artifacts.yaml_source import Place, YamlSource, dotted, nearest, read_yaml
+from mrpipe.artifacts.yaml_source import Place, YamlSource, dotted, nearest, read_yaml, shown
 from mrpipe.campaigns.checks import find_clipping, find_dropouts, force_sign, require_finite, require_roles
 from mrpipe.campaigns.clock import build_clock
 from mrpipe.campaigns.columns import DataFile
@@ -117,7 +117,14 @@ def campaign_files(path: Path) -> tuple[Path, ...]:
     source = read_yaml(file)
     entry = source.build(CampaignEntry, source.content, ())
     folder = _folder(source, entry)
-    names = [str(item.get("file", "")) for item in entry.tests if isinstance(item, dict)]
+    names = []
+    for index, item in enumerate(entry.tests):
+        if not isinstance(item, dict) or "file" not in item:
+            continue  # refused with the tests
+        name = item["file"]
+        if not isinstance(name, str) or not name.strip():
+            raise source.error(("tests", index, "file"), f"is {shown(name)}", "the name of a data file expected")
+        names.append(name)
     return (file, *(folder / name for name in dict.fromkeys(names)))
 
 
@@ -175,7 +182,7 @@ def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) ->
     place: Place = ("tests", index)
     content = reader.entry.tests[index]
     if not isinstance(content, dict):
-        raise source.error(place, f"is {content!r}", "write {name: ..., file: ..., role: ...}")
+        raise source.error(place, f"is {shown(content)}", "write {name: ..., file: ..., role: ...}")
     direct = {key: value for key, value in content.items() if quantity_of(key, rig) and isinstance(value, dict)}
     rest = {key: value for key, value in content.items() if key not in direct}
     if "law" in rest:
@@ -367,7 +374,9 @@ def _require_floors(source: YamlSource, campaign: Campaign) -> None:
         floors = sorted({floor_of(name) or 0 for name in test.channels if name.startswith("floor_")})
         if floors and masses and len(masses) < floors[-1]:
             raise source.error(
-                ("frame", "floor_masses_kg"), f"has {len(masses)} masses", f"{floors[-1]} floors are measured"
+                ("frame", "floor_masses_kg"),
+                f"has {len(masses)} of {floors[-1]} masses",
+                "give one for each measured floor",
             )
 
 

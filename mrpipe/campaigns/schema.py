@@ -162,7 +162,7 @@ class TestEntry(Entry):
     __test__ = False
 
     name: str
-    file: str
+    file: str = Field(min_length=1)
     role: Literal["training", "validation", "repeat"] | None = None
     kind: Literal["sweep", "free-decay", "closed-loop", "random", "ambient"] | None = None
     channels: dict[str, Any] = Field(default_factory=dict)
@@ -254,7 +254,7 @@ class TestEntry(Entry):
 class CampaignEntry(Entry):
     """The whole of campaign.yaml; tests are validated one by one so that an error names its line."""
 
-    campaign: str
+    campaign: str = Field(min_length=1)
     rig: Literal["damper-bench", "shear-frame"]
     channels: dict[str, Any]
     tests: list[Any]

@@ -117,14 +117,33 @@ def refuse_constant_drive(pipeline: Pipeline, names: Collection[str]) -> None:
     UserError
         If that is so, or if the campaign cannot be read.
     """
+    error = constant_drive(pipeline, names)
+    if error is not None:
+        raise error
+
+
+def constant_drive(pipeline: Pipeline, names: Collection[str]) -> UserError | None:
+    """Return the error on a drive that never changes where a stage needs an inverse model; None if it may be built.
+
+    Raises
+    ------
+    UserError
+        If the campaign cannot be read.
+    """
     from mrpipe.campaigns import load_campaign
     from mrpipe.cli.checking import measured_campaigns, with_required
 
     path = measured_campaigns(pipeline.loaded).get("bench")
     if path is None or "train-inverse" not in with_required(pipeline.stages, names):
-        return
-    if not _is_up_to_date(pipeline, "train-inverse"):
-        require_drives(load_campaign(path))
+        return None
+    if _is_up_to_date(pipeline, "train-inverse"):
+        return None
+    campaign = load_campaign(path)
+    try:
+        require_drives(campaign)
+    except UserError as error:
+        return error
+    return None
 
 
 def refuse_unknown_effects(pipeline: Pipeline, names: Collection[str]) -> None:

@@ -136,7 +136,7 @@ def check_headers(loaded: LoadedConfig) -> None:
             raise UserError(
                 loaded.path,
                 f"campaigns.{key}",
-                f"names a {header.rig} campaign ({header.file}), but takes a {RIGS[key]} campaign",
+                f"names a {header.rig} campaign ({shortest(header.file)}), but takes a {RIGS[key]} campaign",
                 f"name it under campaigns.{right}",
             )
         require_known_effects(header, own_effects(loaded))

@@ -58,6 +58,7 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
             pipeline.force = frozenset(pipeline.stages)
         pipeline.keep_going = True
         to_build = [name for name in names if name != "report"]
+        _require_something_to_report(pipeline, to_build)
         refuse_wrong_settings(pipeline, to_build)
         refuse_wrong_campaigns(pipeline, to_build)
         with compiled_ahead([pipeline.stages[name].run.__module__ for name in to_build], pipeline.jobs) as compiling:
@@ -74,6 +75,16 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
         said = f"{counted(len(content['failed']), 'stage')} failed or lack a part: {', '.join(content['failed'])}"
         refused = next((error for error in pipeline.errors if isinstance(error, UserError)), None)
         raise CheckFailed(said) if refused is None else StagesRefused(f"{refused} ({said})")
+
+
+def _require_something_to_report(pipeline: Pipeline, to_build: list[str]) -> None:
+    """Refuse a configuration that lists the report alone, in a run directory where no stage has run."""
+    from mrpipe.config.located import located
+    from mrpipe.pipeline.execution import MANIFESTS
+
+    if not to_build and not (pipeline.run_directory / MANIFESTS).is_dir():
+        problem = f"lists the report alone, and no stage has run in {pipeline.run_directory}"
+        raise located(UserError("stages", "", problem, "list the stages that it should report"), pipeline.loaded)
 
 
 def _until(names: list[str], until: str | None) -> list[str]:
@@ -186,7 +197,8 @@ def report(
 def _require_run(directory: Path) -> None:
     """Refuse a directory that no run has written, so that no report is written into it."""
     if not directory.is_dir():
-        raise UserError(directory, "", "no such run directory", "run `mrpipe run` first")
+        problem = "is a file and no run directory" if directory.exists() else "no such run directory"
+        raise UserError(directory, "", problem, "name a directory that `mrpipe run` wrote, or run it first")
     if not (directory / "manifests").is_dir():
         problem = "is not a run directory, because it has no manifests of stages"
         raise UserError(directory, "", problem, "name a directory that `mrpipe run` wrote, such as runs/my-rig")

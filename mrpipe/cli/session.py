@@ -79,11 +79,14 @@ def rig_key(path: Path) -> str:
 
 def run_directory(options: CommonOptions, loaded: LoadedConfig) -> Path:
     """Return the run directory."""
+    from mrpipe.config.located import located
+
     if options.run is not None and str(options.run) in {"", "."}:
         raise UserError("--run", repr(str(options.run)), "is the working directory", "name another directory")
     name = loaded.config.name
     if options.run is None and (not name or name != Path(name).name or name in {".", ".."}):
-        raise UserError(loaded.path, f"name: {name!r}", "is not the name of a directory", "leave out / and ..")
+        wrong = UserError("name", repr(name), "is not the name of a directory", "leave out / and ..")
+        raise located(wrong, loaded)
     directory = options.run or Path("runs") / name
     if directory.exists() and not directory.is_dir():
         raise UserError("--run", str(directory), "is a file", "give a directory")
@@ -181,7 +184,8 @@ def _require_own(directory: Path) -> None:
     if (directory / ".lock").exists() and ("config.yaml" in there or there == [LOG]):
         return
     if there:
-        problem = f"holds {listed(there[:3])}{' and more' if len(there) > 3 else ''}, which no run has written"
+        named = listed(there) if len(there) <= 3 else f"{', '.join(there[:3])} and more"
+        problem = f"holds {named}, which no run has written"
         raise UserError("--run", str(directory), problem, "give an empty or new directory")
 
 
@@ -208,7 +212,7 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
             outcomes = pipeline.outcomes
             pipeline.write_config()
             yield pipeline
-        except UserError:
+        except (UserError, MemoryError):
             if new:
                 _remove_without_results(new)
             elif before is not None and not any(item.what == "built" for item in outcomes.values()):

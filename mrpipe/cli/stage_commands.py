@@ -99,13 +99,12 @@ def build_and_print(
 
 def _without_constant_drive(pipeline: Pipeline, names: Sequence[str]) -> list[str]:
     """Return the stages that can be built with the drive of the campaign; the others are named on standard error."""
-    from mrpipe.cli.campaign_refusal import refuse_constant_drive
+    from mrpipe.cli.campaign_refusal import constant_drive
 
     possible = []
     for name in names:
-        try:
-            refuse_constant_drive(pipeline, [name])
-        except UserError as error:
+        error = constant_drive(pipeline, [name])
+        if error is not None:
             reason = f"the {error.where} {error.problem}, and an inverse model needs two drives"
             print(f"{name} is left out: {reason}", file=sys.stderr)
             continue

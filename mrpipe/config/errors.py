@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from mrpipe.artifacts.yaml_source import dotted, expected, nearest, shown
+from mrpipe.artifacts.yaml_source import KINDS, dotted, expected, nearest, shown
 from mrpipe.errors import UserError
 
 
@@ -36,11 +36,18 @@ def model_in(annotation: Any) -> type[BaseModel] | None:
 def _finding(error: ValidationError) -> tuple[Any, tuple[str | int, ...]]:
     """Return the first finding and its keys; where a value may be of several kinds, that of the kind it comes nearest.
 
-    pydantic reports every kind and puts its name among the keys, such as `tuple[int,...]`: no key of the user's.
+    pydantic reports every kind and puts its name among the keys, such as `tuple[int,...]` or, last, `str`: no key of
+    the user's.
     """
-    found = [(item, tuple(key for key in item["loc"] if "[" not in str(key))) for item in error.errors()]
+    found = [(item, _without_kinds(item["loc"])) for item in error.errors()]
     first = found[0][1]
     return max((entry for entry in found if entry[1][: len(first)] == first), key=lambda entry: len(entry[1]))
+
+
+def _without_kinds(place: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    keys = tuple(key for key in place if "[" not in str(key))
+    # a name of a kind after an index, because a setting may be called `float`, but no entry of a list
+    return keys[:-1] if len(keys) > 1 and keys[-1] in KINDS and isinstance(keys[-2], int) else keys
 
 
 def explain(

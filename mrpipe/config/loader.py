@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mrpipe.artifacts import config_directory
-from mrpipe.artifacts.yaml_source import YamlSource, closest, nearest, parse, read_yaml
+from mrpipe.artifacts.yaml_source import Place, YamlSource, closest, nearest, parse, read_yaml
 from mrpipe.config.errors import explain, section_of
 from mrpipe.config.model import RunSettings, config_model, options
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
@@ -94,7 +94,8 @@ def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Pa
         at = tuple(error.errors()[0]["loc"])
         if any(_override_path(item) == at[: len(_override_path(item))] for item in overrides):
             raise explain(error, config_model(), "--set", {}) from error
-        origin = next((item for item in reversed(laid) if at in item[1].lines), (path, source))
+        # the file that has the most of the keys; of several, the one that counts last
+        origin = max([*reversed(laid), (path, source)], key=lambda item: _known_depth(item[1].lines, at))
         raise explain(error, config_model(), origin[0], origin[1].lines) from error
     return LoadedConfig(_with_absolute_paths(config, path.resolve().parent), path.resolve(), tuple(overrides))
 
@@ -146,6 +147,14 @@ def _locate(path: Path) -> Path:
     every = f"give a YAML file, or one of {', '.join([*own.values(), *known])}"
     remedy = f"did you mean {own.get(likeliest, likeliest)}?" if likeliest else every
     raise UserError(path, "", "no such configuration", remedy)
+
+
+def _known_depth(lines: Mapping[Place, int], place: Place) -> int:
+    """Return the number of leading keys of a place that a file has; a number as a key is a text in `lines`."""
+    for depth in range(len(place), 0, -1):
+        if place[:depth] in lines or (*place[: depth - 1], str(place[depth - 1])) in lines:
+            return depth
+    return 0
 
 
 def _override_path(override: str) -> tuple[str, ...]:

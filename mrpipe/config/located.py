@@ -7,8 +7,11 @@ are completed here, where the configuration is known.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
 
 from mrpipe.artifacts.yaml_source import read_yaml
 from mrpipe.config.loader import LoadedConfig
@@ -32,9 +35,11 @@ def located(error: UserError, loaded: LoadedConfig) -> UserError:
     # a file of the user may have the name of a section: `design.py`
     if section not in type(loaded.config).model_fields or Path(error.source).is_file():
         return error
-    is_key = _KEY.fullmatch(error.where) is not None
+    further = [*_keys(error.where)]
+    # the name of a file may look like keys: `no.at2`
+    is_key = _KEY.fullmatch(error.where) is not None and _exists(loaded.config, [*keys, *further])
     if is_key:
-        keys += _keys(error.where)
+        keys += further
     where = f"{error.source}{'.' if is_key else ', ' if error.where else ''}{error.where}"
     given = [override.partition("=")[0].strip() for override in loaded.overrides]
     if any(".".join(map(str, keys[:depth])) in given for depth in range(1, len(keys) + 1)):
@@ -44,6 +49,24 @@ def located(error: UserError, loaded: LoadedConfig) -> UserError:
     return UserError(
         loaded.path, where if known is None else f"line {lines[known]}, {where}", error.problem, error.remedy
     )
+
+
+def _exists(content: Any, keys: Sequence[str | int]) -> bool:
+    """Return whether keys and indices lead to a value of the configuration."""
+    for key in keys:
+        if isinstance(content, BaseModel) and key in type(content).model_fields:
+            content = getattr(content, str(key))
+        elif _holds(content, key):
+            content = content[key]
+        else:
+            return False
+    return True
+
+
+def _holds(content: Any, key: str | int) -> bool:
+    if isinstance(content, tuple | list):
+        return isinstance(key, int) and key < len(content)
+    return isinstance(content, Mapping) and key in content
 
 
 def _keys(setting: str) -> Iterator[str | int]:

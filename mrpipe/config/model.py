@@ -51,7 +51,10 @@ class RunSettings(Section):
     name: str = Field("", description="Name of the run; its directory is runs/<name> unless --run gives another one.")
     description: str = Field("", description="Purpose of this configuration, a sentence for the report.")
     seed: int = Field(
-        2011, ge=0, description="Seed of all random numbers; the same inputs and seed give the same results."
+        2011,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of all random numbers; the same inputs and seed give the same results.",
     )
     stages: tuple[str, ...] = Field(
         DEFAULT_STAGES,

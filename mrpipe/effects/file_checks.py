@@ -32,7 +32,7 @@ def check_file(path: Path) -> tuple[Effect | StructuralEffect, list[Check]]:
     raise UserError(
         path,
         "EFFECT",
-        "is missing" if effect is None else f"is a {type(effect).__name__}",
+        "is missing" if effect is None else f"is of the type {type(effect).__name__}",
         "define EFFECT = Effect(...) for a damper or StructuralEffect(...) for a structure",
     )
 

@@ -136,8 +136,11 @@ class FileHashes:
         return digest.hexdigest()
 
     def save(self) -> None:
-        """Write the digests to the memory file; if that is impossible, files are read again later."""
-        if self._new:
+        """Write the digests to the memory file; if that is impossible, files are read again later.
+
+        Its folder is not made for it, so that a command that only looks at a run directory does not make one.
+        """
+        if self._new and self._memory.parent.is_dir():
             from mrpipe.artifacts import atomic_write_text
 
             with suppress(OSError):

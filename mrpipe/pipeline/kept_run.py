@@ -23,7 +23,8 @@ def read_run(directory: Path) -> KeptRun:
         If the directory is missing or is not a run directory, or if its configuration is not valid YAML.
     """
     if not directory.is_dir():
-        raise UserError(directory, "", "no such run directory", _REMEDY)
+        problem = "is a file and no run directory" if directory.exists() else "no such run directory"
+        raise UserError(directory, "", problem, _REMEDY)
     files = sorted(path for path in (directory / "manifests").glob("*.json") if not path.name.startswith("."))
     if not files or not (directory / "config.yaml").is_file():
         missing = "config.yaml" if files else "manifests of stages"

@@ -122,7 +122,7 @@ class Sources:
         """Return which settings make a stage need a campaign that is not configured, so that a user can change them."""
         required = stage.required_by(self.loaded.config)
         named = [setting for item, settings in required.items() if not self.configured(item) for setting in settings]
-        return f"; {stage.name} needs it because of {', '.join(named)}" if named else ""
+        return f"; {stage.name} needs it because of {', '.join(dict.fromkeys(named))}" if named else ""
 
     def lacking(self, name: str) -> str:
         """Return the campaign without which a stage cannot be built; empty if there are all."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mrpipe.artifacts import load_parameter_set
+from mrpipe.artifacts import require_parameter_set
 from mrpipe.effects.damper import require_damper
 from mrpipe.errors import UserError
 from mrpipe.simulation.settings import SimulateSettings
@@ -39,12 +39,5 @@ def require_models(settings: SimulateSettings) -> None:
         If there is no such artifact, parameter set or file; the message names the setting.
     """
     require_damper(settings.damper, "simulate.damper")
-    if settings.frame == "identified":
-        return
-    try:
-        load_parameter_set("frames", settings.frame)
-    except UserError as error:
-        if "no such parameter set" not in error.problem:
-            raise
-        remedy = f"identified, a YAML file, or one of the {error.remedy}"
-        raise UserError("simulate.frame", "", f"no such frame {settings.frame!r}", remedy) from None
+    if settings.frame != "identified":
+        require_parameter_set("frames", settings.frame, "simulate.frame", "identified")

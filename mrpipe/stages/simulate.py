@@ -58,7 +58,8 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     against = None
     if viscous is not None:
         against = indices(viscous, excitation, **judged)
-        values["rms_x_top_over_vd"] = values["rms_x_top_m"] / against["rms_x_top_m"]
+        at_rest = against["rms_x_top_m"] == 0.0  # the motion is below the smallest number
+        values["rms_x_top_over_vd"] = None if at_rest else values["rms_x_top_m"] / against["rms_x_top_m"]
     tested = read_tested(context.artifact("identify-damper")) if settings.damper in DAMPERS else {}
     ranges = check_ranges(rig, controller, response, tested)
     for check in ranges:

@@ -228,12 +228,12 @@ def _ratios(settings: StructureSettings, count: int) -> FloatArray:
 def _influence(key: str, values: Sequence[float], count: int) -> FloatArray | None:
     if not values:
         return None
-    return np.array(_as_many(key, values, count))
+    return np.array(as_many(key, values, count))
 
 
 def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
     names = (
-        tuple(_as_many("degrees_of_freedom", settings.degrees_of_freedom, count)) if settings.degrees_of_freedom else ()
+        tuple(as_many("degrees_of_freedom", settings.degrees_of_freedom, count)) if settings.degrees_of_freedom else ()
     )
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
@@ -248,9 +248,17 @@ def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
     return names
 
 
-def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
+def as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
+    """Return the values of a setting, of which there must be one for each degree of freedom.
+
+    Raises
+    ------
+    UserError
+        If there are more or fewer.
+    """
     if len(values) != count:
-        raise UserError("structure", key, f"has {len(values)} entries", f"the structure has {count} degrees of freedom")
+        problem = f"has {len(values)} {'entry' if len(values) == 1 else 'entries'}"
+        raise UserError("structure", key, problem, f"the structure has {counted(count, 'degree')} of freedom")
     return values
 
 

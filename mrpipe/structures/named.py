@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.structures.given import Reader
+from mrpipe.artifacts import require_parameter_set
+from mrpipe.structures.given import Reader, as_many
 from mrpipe.structures.options import StructureSettings
 from mrpipe.structures.places import ends_among, place_among
+from mrpipe.structures.reduction import require_keep
 from mrpipe.structures.shear_frames import frame_from_parameter_set
 
 
@@ -35,14 +37,19 @@ def require_places(settings: StructureSettings, read: Reader) -> tuple[str, ...]
     UserError
         If a degree of freedom does not exist; the message names the setting.
     """
-    full = names_of_structure(settings, read)
+    count = _count(settings, read)
+    lengths = {key: getattr(settings, key) for key in ("degrees_of_freedom", "influence", "influence_y")}
+    for key, values in lengths.items():
+        if count and values:
+            as_many(key, values, count)
+    full = settings.degrees_of_freedom or _floors(count)
     if not full:
         return ()
+    if settings.reduction.method != "none":
+        require_keep(settings.reduction)
     for place, name in enumerate(settings.reduction.keep):
         place_among(full, name, f"structure.reduction.keep[{place}]")
     names = _after_reduction(full, settings)
-    if not names:
-        return ()
     for place, damper in enumerate(settings.dampers):
         ends_among(names, *damper.between, where=f"structure.dampers[{place}].between")
     for place, name in enumerate(settings.accelerometers):
@@ -52,7 +59,11 @@ def require_places(settings: StructureSettings, read: Reader) -> tuple[str, ...]
 
 def names_of_structure(settings: StructureSettings, read: Reader) -> tuple[str, ...]:
     """Return the names of all degrees of freedom before a reduction; empty if only the matrices show them."""
-    return settings.degrees_of_freedom or tuple(f"floor {place + 1}" for place in range(_count(settings, read)))
+    return settings.degrees_of_freedom or _floors(_count(settings, read))
+
+
+def _floors(count: int) -> tuple[str, ...]:
+    return tuple(f"floor {place + 1}" for place in range(count))
 
 
 def _count(settings: StructureSettings, read: Reader) -> int:
@@ -65,17 +76,18 @@ def _count(settings: StructureSettings, read: Reader) -> int:
     if table.given:
         return len(table.mass.values) or int(np.size(read(Path(table.file), table.mass.name)))
     if settings.frame:
+        require_parameter_set("frames", settings.frame, "structure.frame")
         return frame_from_parameter_set(settings.frame).floors
     # an OpenSees script would be run for it
     return 0 if not file or file.endswith(".py") else max(np.shape(read(Path(file), settings.mass.name)), default=1)
 
 
 def _after_reduction(full: Sequence[str], settings: StructureSettings) -> tuple[str, ...]:
-    """Return the names after the reduction; empty if the reduction will be refused."""
+    """Return the names after the reduction."""
     reduction = settings.reduction
     if reduction.method == "none":
         return tuple(full)
     # in the order of the structure, as the reduction has them
     kept = sorted({place_among(full, name) for name in reduction.keep})
     modes = {"craig-bampton": reduction.modes, "balanced": reduction.modes - len(kept)}.get(reduction.method, 0)
-    return (*(full[place] for place in kept), *(f"mode {mode + 1}" for mode in range(modes))) if kept else ()
+    return (*(full[place] for place in kept), *(f"mode {mode + 1}" for mode in range(modes)))

@@ -184,6 +184,23 @@ def balanced_structure(
     return _projected(frame, basis, kept, band_high_hz)
 
 
+def require_keep(settings: ReductionSettings) -> None:
+    """Refuse a reduction that keeps no degree of freedom.
+
+    Raises
+    ------
+    UserError
+        If that is so.
+    """
+    if not settings.keep:
+        raise UserError(
+            "structure.reduction",
+            "keep",
+            "is empty, so the damper could not be attached",
+            "name at least the degrees of freedom of the damper and of the sensors",
+        )
+
+
 def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
     """Reduce a structure with the settings; without a reduction coordinates and response are unchanged.
 
@@ -196,13 +213,7 @@ def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
     if settings.method == "none":
         everything = tuple(range(frame.floors))
         return Reduced(frame, np.eye(frame.floors), everything, 0.0, high or 0.0)
-    if not settings.keep:
-        raise UserError(
-            "structure.reduction",
-            "keep",
-            "is empty, so the damper could not be attached",
-            "name at least the degrees of freedom of the damper and of the sensors",
-        )
+    require_keep(settings)
     # in the order of the structure, because results call the last one the top
     kept = sorted(degree_of_freedom(frame, name, "structure.reduction.keep") for name in settings.keep)
     if settings.method == "guyan":

@@ -433,7 +433,7 @@ def test_a_mass_driver_and_unknown_masses(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"frame": {"floor_masses_kg": [1.0]}}, "has 1 masses; 2 floors are measured"),
+        ({"frame": {"floor_masses_kg": [1.0]}}, "has 1 of 2 masses; give one for each measured floor"),
         ({"frame": {"floor_masses_kg": [1.0, -2.0]}}, "masses above zero expected"),
         ({"tests": [{"name": "s", "file": "sweep.csv"}]}, "kind: is missing; write kind: sweep, free-decay"),
         ({"channels": {"floor_acc_1": {"column": "a1", "unit": "m/s^2"}}}, "unknown channel; did you mean"),

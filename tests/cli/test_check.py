@@ -435,7 +435,7 @@ def test_a_name_that_cannot_be_that_of_a_directory(
     config = project(tmp_path)
     config.write_text(config.read_text().replace("name: own", f"name: '{name}'"), encoding="utf-8")
     status, _, err = checked(capsys, str(config))
-    assert status == 2 and f"name: {name!r}: is not the name of a directory" in err
+    assert status == 2 and f"name, {name!r}: is not the name of a directory" in err
 
 
 @pytest.mark.golden
@@ -469,3 +469,28 @@ def test_what_the_identification_of_a_frame_refuses_is_an_error_of_check_and_run
     assert status == 1 and expected in out
     assert run(["run", str(config), "--run", str(tmp_path / "run"), "--quiet"]) == 2
     assert expected in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("file", "file: ''", "tests[0].file: is ''; the name of a data file expected"),
+        ("file", "file: [a.csv]", "tests[0].file: is ['a.csv']; the name of a data file expected"),
+        ("file", "", "tests[0]: is empty; write {name: ..., file: ..., role: ...}"),
+        ("campaign: own", "campaign: ''", "line 1, campaign: is ''; a text that is not empty expected"),
+        ("campaign: own", "campaign:", "line 1, campaign: is empty; a text expected"),
+    ],
+)
+def test_a_name_that_is_empty_or_no_text(
+    old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path)
+    file = tmp_path / "data" / "campaign.yaml"
+    content = file.read_text(encoding="utf-8")
+    if old.startswith("file"):
+        old = next(line.strip(" -") for line in content.splitlines() if "file:" in line)
+    assert old in content
+    file.write_text(content.replace(old, new, 1), encoding="utf-8")
+    status, _, error = checked(capsys, str(config))
+    assert status == 2 and said in error

@@ -63,7 +63,7 @@ MISTAKES = {
     "law missing": (["simulate"], "--law: is missing; one of vd, vdps"),
     "law of the export": (["export", "--law", "vdn"], "vdn: is not a control law; did you mean vdns?"),
     "run in the working directory": (["prepare", "--run", ""], "is the working directory"),
-    "name of a path": (["prepare", "--set", "name=../x"], "'../x': is not the name of a directory"),
+    "name of a path": (["prepare", "--set", "name=../x"], "--set: name, '../x': is not the name of a directory"),
     "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),
     "until part of a name": (["run", "--until", "train"], "--until: train: no such stage; did you mean"),
     "unknown format": (
@@ -85,6 +85,9 @@ MISTAKES = {
     "no rig": (["record", "--rig", "table"], "--rig: table: is not a rig; one of bench, frame, closed-loop"),
     "nothing to export": (["export", "plant"], "export: plant: cannot be exported"),
     "no run to report": (["report", "nowhere"], "no such run directory"),
+    "file in place of a run": (["report", "README.md"], "README.md: is a file and no run directory; name a directory"),
+    "file in place of a run, status": (["status", "README.md"], "README.md: is a file and no run directory"),
+    "file in place of a run, compare": (["compare", "README.md", "docs"], "README.md: is a file and no run directory"),
     "no run in a directory": (["report", "tests"], "tests: is not a run directory, because it has no manifests"),
     "no run for status": (["status", "nowhere"], "no such run directory"),
     "no run in a directory, status": (

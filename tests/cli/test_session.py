@@ -8,6 +8,7 @@ from mrpipe.cli import run
 from mrpipe.cli.options import CommonOptions
 from mrpipe.cli.session import load, session
 from mrpipe.errors import UserError
+from tests.cli.test_check import project
 
 
 @pytest.mark.property
@@ -104,6 +105,15 @@ def test_an_unknown_stage_is_named_with_its_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.property
+def test_the_report_alone_needs_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "own.yaml"
+    config.write_text("name: own\nstages: [report]\n", encoding="utf-8")
+    assert run(["run", "--config", str(config), "--run", str(tmp_path / "run")]) == 2
+    assert "own.yaml: line 2, stages: lists the report alone, and no stage has run in " in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.property
 @pytest.mark.parametrize("what", ["inverse", "damper", "frame", "controller", "all"])
 def test_an_export_without_data_changes_nothing(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = tmp_path / "own.yaml"
@@ -122,3 +132,34 @@ def test_an_export_without_data_changes_nothing(what: str, tmp_path: Path, capsy
     kept = {path.name: path.read_text(encoding="utf-8") for path in results.glob("*.h5")}
     assert len(kept) == 5 and set(kept.values()) == {"a result"}
     assert (results / "config.yaml").read_text(encoding="utf-8") == "name: earlier\n"
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("command", [["status"], ["check"], ["report"], ["status", "--json"]])
+def test_a_command_that_only_looks_makes_no_run_directory(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert run([*command, "--config", str(config)]) == (2 if command == ["report"] else 0)
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.property
+def test_an_export_of_everything_names_what_is_wrong_with_the_campaign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project(tmp_path)
+    file = tmp_path / "data" / "campaign.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("unit: N", "unit: NN"), encoding="utf-8")
+    assert run(["export", "all", "--config", str(config), "--run", str(tmp_path / "run")]) == 2
+    error = capsys.readouterr().err
+    assert "'NN': is not a unit" in error and "needs two drives" not in error
+
+
+@pytest.mark.property
+def test_a_run_for_which_the_memory_is_too_small_leaves_no_new_directory(tmp_path: Path) -> None:
+    options = CommonOptions(config=project(tmp_path), run=tmp_path / "run", quiet=True)
+    with pytest.raises(MemoryError), session(options):
+        raise MemoryError
+    assert not (tmp_path / "run").exists()

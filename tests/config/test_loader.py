@@ -32,7 +32,15 @@ FAULTS = {
         "line 2, prepare.cutoff_hz: is '12,5'; a number expected; write a decimal point, as in 12.5",
     ),
     "decimal comma in braces": ("prepare: {cutoff_hz: 12,5}\n", "a decimal number has a point and no comma"),
-    "true for a number": ("prepare: {cycles: true}\n", "prepare.cycles: is True; a number expected"),
+    "true for a number": ("prepare: {cycles: true}\n", "prepare.cycles: is true; a number expected"),
+    "infinite number": ("prepare: {cutoff_hz: .inf}\n", "line 1, prepare.cutoff_hz: is inf; a finite number expected"),
+    "number beyond every range": ("prepare: {cutoff_hz: 1e400}\n", "prepare.cutoff_hz: is '1e400'; a finite number"),
+    "seed too large": ("seed: 9223372036854775808\n", "line 1, seed: is 9223372036854775808; a value less than or"),
+    "empty section": ("prepare:\n", "line 1, prepare: is empty; a mapping of keys to values expected"),
+    "wrong end of a damper": (
+        "structure: {dampers: [{between: [1.5, ground]}]}\n",
+        "line 1, structure.dampers[0].between[0]: is 1.5; a text expected; put it in quotes",
+    ),
     "no stage": ("stages: []\n", "line 1, stages: is []; a list of at least 1 value expected"),
     "stage twice": ("stages: [prepare, assemble, prepare]\n", "prepare is listed more than once"),
     "no mapping": ("- a\n- b\n", "line 1: is not a mapping; write `key: value` lines"),
@@ -152,3 +160,22 @@ def test_fault_of_settings_laid_over_names_their_file(tmp_path: Path) -> None:
     assert str(caught.value).startswith(f"{over}: line 4, laboratory.bench.tests[0].motion: is 'sinus'")
     with pytest.raises(UserError, match=r"--settings: nowhere\.yaml: no such file"):
         load_config(path, [], [Path("nowhere.yaml")])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("prepare: {cutoff_hz: 1,5}\n", "some.yaml: line 1, prepare[5]: 5 is a number in place of a name"),
+        ("prepare: {cutof_hz: 1}\n", "some.yaml: line 1, prepare.cutof_hz: unknown key"),
+        ("export: {prefix: 3x}\n", "some.yaml: line 1, export.prefix: is '3x'; a text of the form ^[A-Za-z_]"),
+        ("name: a\n", "config.yaml: line 1, prepare.order: is 'x'; a whole number expected"),
+    ],
+)
+def test_a_fault_is_named_in_the_file_that_has_it(content: str, said: str, tmp_path: Path) -> None:
+    config, overlay = tmp_path / "config.yaml", tmp_path / "some.yaml"
+    wrong = "x" if "config.yaml" in said else "4"
+    config.write_text(f"prepare: {{order: {wrong}}}\n", encoding="utf-8")
+    overlay.write_text(content, encoding="utf-8")
+    with pytest.raises(UserError) as refused:
+        load_config(config, [], [overlay])
+    assert said in str(refused.value)

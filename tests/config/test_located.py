@@ -49,6 +49,12 @@ def test_a_place_that_is_no_key_is_named_after_the_section(path):
     assert str(error) == f"{path}: line 2, structure, damper of floor 2: has no brace; give one"
 
 
+@pytest.mark.parametrize("name", ["no.at2", "roof", "storeys[7]"])
+def test_a_name_that_looks_like_a_key_is_not_one(path, name):
+    error = located(UserError("simulate.excitation.file", name, "there is no such file", "name one"), load_config(path))
+    assert str(error) == f"{path}: simulate.excitation.file, {name}: there is no such file; name one"
+
+
 def test_a_setting_that_the_file_lacks_has_no_line(path):
     error = located(UserError("calibrate", "target_mode", "is 4", "it is 1 to 2"), load_config(path))
     assert str(error) == f"{path}: calibrate.target_mode: is 4; it is 1 to 2"

@@ -194,5 +194,5 @@ def test_a_file_of_a_structure_and_one_without_effect(tmp_path: Path) -> None:
     ]
     assert effect.name == "impact"
     own.write_text("EFFECT = 3\n")
-    with pytest.raises(UserError, match="EFFECT: is a int; define EFFECT"):
+    with pytest.raises(UserError, match="EFFECT: is of the type int; define EFFECT"):
         check_file(own)

@@ -55,6 +55,10 @@ def test_a_parameter_set_has_its_floors_and_a_script_is_not_run() -> None:
         ({"dampers": [{"between": [4, 3]}]}, "structure.dampers[0].between", "'4' is not a degree of freedom"),
         ({"accelerometers": [1, "roof"]}, "structure.accelerometers[1]", "'roof' is not a degree of freedom"),
         ({"reduction": {"method": "guyan", "keep": ["deck"]}}, "structure.reduction.keep[0]", "'deck' is not a degree"),
+        ({"reduction": {"method": "modal"}}, "structure.reduction", "keep: is empty"),
+        ({"degrees_of_freedom": ["a", "b"]}, "structure",
+         "degrees_of_freedom: has 2 entries; the structure has 3 degrees of freedom"),
+        ({"influence": [1.0]}, "structure", "influence: has 1 entry; the structure has 3 degrees of freedom"),
         ({"reduction": {"method": "guyan", "keep": [1, 3]}, "dampers": [{"between": ["floor 2", 1]}]},
          "structure.dampers[0].between", "'floor 2' is not a degree of freedom; 1 to 2, or one of floor 1, floor 3"),
     ],
@@ -71,5 +75,8 @@ def test_places_after_a_reduction() -> None:
     assert require_places(settings, read) == ("floor 1", "floor 3", "mode 1")
     balanced = StructureSettings(storeys=STOREYS, reduction={"method": "balanced", "keep": [1], "modes": 2})
     assert require_places(balanced, read) == ("floor 1", "mode 1")
-    # without places to keep the reduction itself is refused
-    assert require_places(StructureSettings(storeys=STOREYS, reduction={"method": "modal"}), read) == ()
+
+
+def test_an_unknown_parameter_set_is_named_with_its_setting() -> None:
+    with pytest.raises(UserError, match=r"structure.frame: no such frame 'nix'; a YAML file, or one of the known sets"):
+        require_places(StructureSettings(frame="nix"), read)
