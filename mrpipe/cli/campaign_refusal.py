@@ -55,6 +55,24 @@ def refuse_wrong_campaigns(pipeline: Pipeline, names: Collection[str]) -> None:
             require_frame_tests(campaign)
 
 
+def refuse_before_building(pipeline: Pipeline, names: Sequence[str], *, where_possible: bool = False) -> None:
+    """Refuse missing campaigns, wrong settings and unknown declared effects before the first stage is built.
+
+    Parameters
+    ----------
+    pipeline, names, where_possible
+        As for :func:`refuse_missing_campaigns`.
+
+    Raises
+    ------
+    UserError
+        Naming the file and the line.
+    """
+    refuse_missing_campaigns(pipeline, names, where_possible=where_possible)
+    refuse_wrong_settings(pipeline, names)
+    refuse_unknown_effects(pipeline, names)
+
+
 def refuse_missing_campaigns(pipeline: Pipeline, names: Sequence[str], *, where_possible: bool = False) -> None:
     """Refuse stages whose campaign the configuration does not name, before files of an earlier run are changed.
 

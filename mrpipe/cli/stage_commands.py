@@ -52,12 +52,7 @@ def build_and_print(
         If a requested stage has no data, if it needs an inverse model and the drive of the campaign never changes, or
         if it traces effects and the campaign declares an unknown one.
     """
-    from mrpipe.cli.campaign_refusal import (
-        refuse_constant_drive,
-        refuse_missing_campaigns,
-        refuse_unknown_effects,
-        refuse_wrong_settings,
-    )
+    from mrpipe.cli.campaign_refusal import refuse_before_building, refuse_constant_drive
     from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
     from mrpipe.reporting.headlines import in_brief
@@ -68,9 +63,7 @@ def build_and_print(
             _require_use(names, pipeline, options.campaign)
         if options.force:
             pipeline.force = frozenset(names)
-        refuse_missing_campaigns(pipeline, names, where_possible=where_possible)
-        refuse_wrong_settings(pipeline, names)
-        refuse_unknown_effects(pipeline, names)
+        refuse_before_building(pipeline, names, where_possible=where_possible)
         if where_possible:
             names = _without_constant_drive(pipeline, names)
         else:
