@@ -121,7 +121,8 @@ def _layout(tests: FrameTests) -> Layout:
     if tests.positions:
         return Layout(3 * tests.floor_masses.size, None, is_chain=False)
     masses = tests.floor_masses if np.isfinite(tests.floor_masses).all() else None
-    return Layout(tests.floor_masses.size, masses, is_chain=len(directions) <= 1)
+    is_chain = len(directions) <= 1
+    return Layout(tests.floor_masses.size, masses, is_chain, motions=1 if is_chain else 3)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from mrpipe.words import counted, some
 _BESIDE = "no sensor at the base was found; this one is near the structure and may move differently"
 _FIRST_FLOOR = "no sensor below it was found; in an American building the 1st floor is at the ground"
 _BY_ORDER = "the number of this floor is guessed from the order of columns"
-_BY_SENSOR = "each sensor counts as a floor, from the lowest level up, because some levels have several sensors or none"
+_BY_LEVEL = "the levels with sensors are numbered from the lowest one up, because some levels have no sensor"
+_SEVERAL = "some levels have several sensors: the ends x1, x2, ... of the names number the sensors of a level"
 _COMPASS = {"n": 0, "north": 0, "e": 90, "east": 90, "s": 180, "south": 180, "w": 270, "west": 270}
 _DEGREES = re.compile(r"^(\d{1,3})\s*(?:deg\w*)?\.?$")
 
@@ -88,19 +89,30 @@ def _ground(chosen: Sequence[Column], places: dict[str, Place]) -> tuple[Column 
 
 
 def _floors(floors: Sequence[Column], places: dict[str, Place]) -> dict[str, Guess]:
-    """Return the channels of the floors, from the lowest level up; in the order of columns where a level is unknown."""
-    levels = [places[item.name].level for item in floors]
-    known = [level for level in levels if level is not None]
-    doubt = "" if len(known) == len(floors) else _BY_ORDER
-    ordered = list(floors)
-    if not doubt:
-        ordered = [item for _, item in sorted(zip(known, floors, strict=True), key=lambda pair: pair[0])]
-        numbers = sorted(known)
-        numbered = [level for level in numbers if level < ROOF]
-        # the lowest floor above the ground is the 1st, or the 2nd where the 1st is at the ground
-        whole = any(numbered == list(range(first, first + len(numbered))) for first in (1, 2))
-        doubt = "" if whole and len(set(numbers)) == len(numbers) else _BY_SENSOR
-    return {f"floor_acceleration_{number}": _guess(item, doubt) for number, item in enumerate(ordered, start=1)}
+    """Return the channels of the floors, from the lowest level up; in the order of columns where a level is unknown.
+
+    Sensors of one level belong to one floor. Several sensors on a level show that floors turn, so that all names get an
+    end that numbers the sensors of a level.
+    """
+    by_level: dict[int, list[Column]] = {}
+    for item in floors:
+        level = places[item.name].level
+        if level is None:
+            return {
+                f"floor_acceleration_{number}": _guess(each, _BY_ORDER) for number, each in enumerate(floors, start=1)
+            }
+        by_level.setdefault(level, []).append(item)
+    levels = sorted(by_level)
+    numbered = [level for level in levels if level < ROOF]
+    # the lowest floor above the ground is the 1st, or the 2nd where the 1st is at the ground
+    whole = any(numbered == list(range(first, first + len(numbered))) for first in (1, 2))
+    several = any(len(items) > 1 for items in by_level.values())
+    doubt = "; ".join(filter(None, ("" if whole else _BY_LEVEL, _SEVERAL if several else "")))
+    return {
+        f"floor_acceleration_{number}" + (f"_x{place}" if several else ""): _guess(item, doubt)
+        for number, level in enumerate(levels, start=1)
+        for place, item in enumerate(by_level[level], start=1)
+    }
 
 
 def _guess(column: Column, doubt: str) -> Guess:

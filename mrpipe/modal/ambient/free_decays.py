@@ -217,7 +217,7 @@ def _candidates(decays: _Decays, layout: Layout, low_hz: float) -> list[Cluster]
     sensors = decays.parts[0].shape[1]
     records = Records(tuple(part.T for part in decays.parts), decays.rate_hz, rows, decays.high_hz)
     poles = []
-    for order in range(2 * layout.floors, 2 * layout.floors + 2 * _ORDERS, 2):
+    for order in range(2 * layout.modes, 2 * layout.modes + 2 * _ORDERS, 2):
         if order > min(size.size, (rows - 1) * sensors):
             break
         observed = left[:, :order] * np.sqrt(size[:order])

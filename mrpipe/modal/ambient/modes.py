@@ -254,7 +254,7 @@ def _set_up(
     """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
     records = _records(tests, layout, *band_hz)
     _require_length(records, tests, band_hz[0], source)
-    orders = estimator.orders(layout.floors, len(tests[0].sensors))
+    orders = estimator.orders(layout.modes, len(tests[0].sensors))
     weights = block_weights(records.blocks) if _share_of(tests, records) < 1.0 else np.ones(len(records.blocks))
     statistics = [
         weight * estimator.statistic(block, records) for weight, block in zip(weights, records.blocks, strict=True)

@@ -60,7 +60,7 @@ def _quiet() -> Iterator[None]:
 class Estimator(Protocol):
     """An estimator of poles from responses."""
 
-    def orders(self, floors: int, sensors: int) -> range:
+    def orders(self, modes: int, sensors: int) -> range:
         """Return the model orders to try."""
 
     def statistic(self, block: FloatArray, records: Records) -> ComplexArray | FloatArray:
@@ -73,9 +73,9 @@ class Estimator(Protocol):
 class SubspaceEstimator:
     """Covariance-driven stochastic subspace identification (SSI)."""
 
-    def orders(self, floors: int, sensors: int) -> range:  # noqa: ARG002 - only pLSCF depends on the sensors
+    def orders(self, modes: int, sensors: int) -> range:  # noqa: ARG002 - only pLSCF depends on the sensors
         """Return numbers of states."""
-        return range(2 * floors, 2 * floors + 32, 2)
+        return range(2 * modes, 2 * modes + 32, 2)
 
     def statistic(self, block: FloatArray, records: Records) -> FloatArray:
         """Return the Hankel matrix of the correlation functions, each divided by its own number of products.
@@ -106,9 +106,9 @@ class SubspaceEstimator:
 class PolyreferenceEstimator:
     """Polyreference least-squares complex frequency estimator (pLSCF, PolyMAX) on positive half spectra."""
 
-    def orders(self, floors: int, sensors: int) -> range:
+    def orders(self, modes: int, sensors: int) -> range:
         """Return orders of the matrix polynomial; each order has as many poles as there are sensors."""
-        least = max(2, -(-2 * floors // sensors))
+        least = max(2, -(-2 * modes // sensors))
         return range(least, least + 11)
 
     def statistic(self, block: FloatArray, records: Records) -> ComplexArray:

@@ -158,10 +158,13 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
 def _modes_only(modes: PartialModes, masses: FloatArray, layout: Layout, unknown_rows: list[int]) -> Assembly:
     shapes = normalise_to_largest(modes.shapes)
     shapes[unknown_rows] = np.nan
-    reason = "the sensors measure in several directions" if not layout.is_chain else "no mass is known and no force"
+    if layout.is_chain:
+        reason, remedy = "no mass is known and no force", "give frame.floor_masses_kg, or measure the force of a shaker"
+    else:
+        reason = "the sensors measure in several directions or at several places of a floor"
+        remedy = "give frame.sensor_positions_m and the masses, if the sensors of each floor determine how it moves"
     findings = [
-        f"only modes are determined, because {reason}: mass, damping and stiffness matrices are left out"
-        + (" (give frame.floor_masses_kg, or measure the force of a shaker)" if layout.is_chain else "")
+        f"only modes are determined, because {reason}: mass, damping and stiffness matrices are left out ({remedy})"
     ]
     if unknown_rows:
         floors = ", ".join(str(row + 1) for row in unknown_rows)

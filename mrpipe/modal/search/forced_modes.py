@@ -108,15 +108,15 @@ def _look(
     decays: Sequence[FrameTest] = (),
 ) -> _Found | None:
     """Fit stable poles; while the set of modes is not complete, fit less stable and hidden poles as well."""
-    floors = layout.floors
+    modes = layout.modes
     whole, spectra = spectra, thinned(spectra, _SEARCH_LINES)
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
-    orders = range(2 * floors + 2, 2 * floors + 20, 2)
+    orders = range(2 * modes + 2, 2 * modes + 20, 2)
     candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
     candidates = [item for item in candidates if band[0] <= item.angular_frequency <= band[1]]
     # poles at the end of the band are often numerical: they occur less often and have more damping
     candidates.sort(key=lambda item: (-item.occurrences, item.damping_ratio))
-    firm = [item for item in candidates if item.occurrences >= len(orders) // 2][: floors + _SURPLUS]
+    firm = [item for item in candidates if item.occurrences >= len(orders) // 2][: modes + _SURPLUS]
     firm += _of_decays(decays, firm, band_hz)
     if not firm:
         return None
@@ -127,20 +127,20 @@ def _look(
     doubtful = [item for item in candidates if item not in firm and item.occurrences >= 2 and item.damping_ratio < 0.05]
     best = found(with_decays(_fit_candidates(spectra, firm), decays))
     if not best.keep and doubtful:
-        more = doubtful[: max(_SURPLUS, floors + _SURPLUS - len(firm))]
+        more = doubtful[: max(_SURPLUS, modes + _SURPLUS - len(firm))]
         best = found(with_decays(_fit_candidates(spectra, [*firm, *more]), decays))
     for _ in range(_ROUNDS):
         if best.keep:
             break
         kept = sound(best.fit)
         fit = best.fit.only(kept)
-        extra = hidden_poles(best.fit, band, max(2, floors + 1 - len(kept)))
+        extra = hidden_poles(best.fit, band, max(2, modes + 1 - len(kept)))
         if not extra:
             break
         omega = np.concatenate([fit.angular_frequencies, [item.angular_frequency for item in extra]])
         zeta = np.concatenate([fit.damping_ratios, [item.damping_ratio for item in extra]])
         best = found(with_decays(fit_modes(spectra, omega, zeta, evaluations=15), decays))
-        if len(omega) > 2 * floors + 2 * _SURPLUS:
+        if len(omega) > 2 * modes + 2 * _SURPLUS:
             break
     return best
 

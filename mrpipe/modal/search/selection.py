@@ -50,11 +50,19 @@ class Layout:
         Shape (floors,) [kg]; None if they are unknown.
     is_chain
         Whether all sensors measure in one direction, so that mode r has r - 1 sign changes.
+    motions
+        Motions of each floor, each of which has a mode: 3 where a floor moves in two directions and turns.
     """
 
     floors: int
     masses: FloatArray | None
     is_chain: bool = True
+    motions: int = 1
+
+    @property
+    def modes(self) -> int:
+        """Largest number of modes that are sought."""
+        return self.floors * self.motions
 
 
 def floor_shapes(fit: MultiModeFit, layout: Layout) -> tuple[FloatArray, FloatArray]:
