@@ -151,8 +151,6 @@ def expected(fault: Mapping[str, Any]) -> str:
         close = difflib.get_close_matches(str(fault["input"]), words, n=1, cutoff=0.5)
         hint = f"did you mean {close[0]}? " if close else ""
         return f"{hint}{context['expected']} expected"
-    if kind == "string_pattern_mismatch":
-        return f"a text of the form {context['pattern']} expected"
     if kind == "too_long":
         return f"a list of at most {context['max_length']} values expected"
     if kind == "too_short":

@@ -167,7 +167,10 @@ def test_fault_of_settings_laid_over_names_their_file(tmp_path: Path) -> None:
     [
         ("prepare: {cutoff_hz: 1,5}\n", "some.yaml: line 1, prepare[5]: 5 is a number in place of a name"),
         ("prepare: {cutof_hz: 1}\n", "some.yaml: line 1, prepare.cutof_hz: unknown key"),
-        ("export: {prefix: 3x}\n", "some.yaml: line 1, export.prefix: is '3x'; a text of the form ^[A-Za-z_]"),
+        (
+            "export: {prefix: 3x}\n",
+            "some.yaml: line 1, export.prefix: is '3x'; a name of letters, digits and _ expected",
+        ),
         ("name: a\n", "config.yaml: line 1, prepare.order: is 'x'; a whole number expected"),
     ],
 )

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
 
@@ -42,6 +41,9 @@ class StrongMotion:
         """Return the channel at another sampling interval [s], by a linear-phase filter without delay and aliases."""
         if abs(self.interval_s / interval_s - 1.0) <= _SAME_INTERVAL:
             return self
+        # commands that open no record start without scipy
+        from scipy.signal import resample_poly
+
         ratio = Fraction(self.interval_s / interval_s).limit_denominator(1000)
         taps = {"window": ("kaiser", 8.0), "padtype": "line"}
         values = resample_poly(self.acceleration_m_s2, ratio.numerator, ratio.denominator, **taps)
