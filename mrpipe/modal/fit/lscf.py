@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,24 +119,50 @@ def stable_poles(
     largest_damping_ratio, frequency_tolerance
         Largest damping ratio of a physical pole, and relative tolerance of the frequency of the same pole.
     """
-    found: list[tuple[float, float, int]] = []
-    for order, poles in zip(orders, lscf_poles(spectra, orders, band_rad_s[1]), strict=True):
+    found = zip(orders, lscf_poles(spectra, orders, band_rad_s[1]), strict=True)
+    return [
+        candidate_of(group) for group in groups_of_poles(found, band_rad_s, largest_damping_ratio, frequency_tolerance)
+    ]
+
+
+Occurrence = tuple[float, float, int]
+"""Angular frequency [rad/s], damping ratio and model order of a pole."""
+
+
+def groups_of_poles(
+    found: Iterable[tuple[int, NDArray[np.complex128]]],
+    band_rad_s: tuple[float, float],
+    largest_damping_ratio: float,
+    frequency_tolerance: float,
+) -> list[list[Occurrence]]:
+    """Return the poles of all orders with nearly the same frequency as one group, lowest first.
+
+    Parameters
+    ----------
+    found
+        Model orders and their poles [rad/s].
+    band_rad_s, largest_damping_ratio, frequency_tolerance
+        As for :func:`stable_poles`.
+    """
+    every: list[Occurrence] = []
+    for order, poles in found:
         for pole in poles:
             omega, zeta = float(abs(pole)), float(-pole.real / abs(pole))
             if 0.0 < zeta < largest_damping_ratio and band_rad_s[0] <= omega <= band_rad_s[1]:
-                found.append((omega, zeta, order))
-    found.sort()
-    groups: list[list[tuple[float, float, int]]] = []
-    for item in found:
+                every.append((omega, zeta, order))
+    groups: list[list[Occurrence]] = []
+    for item in sorted(every):
         if groups and item[0] - np.median([g[0] for g in groups[-1]]) <= frequency_tolerance * item[0]:
             groups[-1].append(item)
         else:
             groups.append([item])
-    return [
-        PoleCandidate(
-            float(np.median([g[0] for g in group])),
-            float(np.median([g[1] for g in group])),
-            len({g[2] for g in group}),
-        )
-        for group in groups
-    ]
+    return groups
+
+
+def candidate_of(group: Sequence[Occurrence]) -> PoleCandidate:
+    """Return the pole of a group: medians over the model orders."""
+    return PoleCandidate(
+        float(np.median([item[0] for item in group])),
+        float(np.median([item[1] for item in group])),
+        len({item[2] for item in group}),
+    )

@@ -11,6 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.modal.fit.lscf import PoleCandidate, stable_poles
+from mrpipe.modal.fit.matrix_fraction import common_sensors, stable_matrix_poles
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -112,7 +113,10 @@ def _look(
     whole, spectra = spectra, thinned(spectra, _SEARCH_LINES)
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
     orders = range(2 * modes + 2, 2 * modes + 20, 2)
-    candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
+    if not layout.is_chain and len(common_sensors(spectra)) > 1:
+        candidates = stable_matrix_poles(spectra, modes, (0.0, 2.0 * np.pi * band_hz[1]))
+    else:
+        candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
     candidates = [item for item in candidates if band[0] <= item.angular_frequency <= band[1]]
     # poles at the end of the band are often numerical: they occur less often and have more damping
     candidates.sort(key=lambda item: (-item.occurrences, item.damping_ratio))
