@@ -21,7 +21,7 @@ from mrpipe.structures.given_checks import (
     tell_of_changed_modes,
     tell_of_equal_matrices,
 )
-from mrpipe.structures.given_units import SI, tell_of_assumed_units, unit_of_column
+from mrpipe.structures.given_units import SI, unit_of_column, warn_of_assumed_units
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.places import GROUND
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
@@ -87,7 +87,7 @@ def structure_from_settings(
         _names(settings, frame.floors),
         influence_y=_influence("influence_y", settings.influence_y, frame.floors),
     )
-    tell_of_assumed_units(settings, warn)
+    warn_of_assumed_units(settings, warn)
     tell_of_asymmetric_damping(full.damping, warn)
     complete = without_massless(full, warn)
     require_restoring_forces(complete)

@@ -46,7 +46,7 @@ def input_units(settings: StructureSettings) -> dict[str, dict[str, Any]]:
     return {key: {"unit": unit or SI[key], "assumed": not unit} for key, unit in stated.items()}
 
 
-def tell_of_assumed_units(settings: StructureSettings, warn: Callable[[str], None] | None) -> None:
+def warn_of_assumed_units(settings: StructureSettings, warn: Callable[[str], None] | None) -> None:
     """Warn where a matrix or a column has no unit, so that SI is taken.
 
     Parameters

@@ -13,6 +13,11 @@ from mrpipe.modal.fit.projection import stack
 from mrpipe.modal.records import Place, Sensor
 from mrpipe.modal.spectra import RecordSpectrum, all_inputs, all_sensors
 
+_LARGEST_DAMPING = 0.2
+"""Largest damping ratio of a physical pole."""
+_SAME_POLE = 0.003
+"""Relative difference of the frequencies of the same pole at two orders."""
+
 
 @dataclass(frozen=True)
 class PoleCandidate:
@@ -101,12 +106,7 @@ def lscf_poles(
 
 
 def stable_poles(
-    spectra: Sequence[RecordSpectrum],
-    orders: Sequence[int],
-    band_rad_s: tuple[float, float],
-    *,
-    largest_damping_ratio: float = 0.2,
-    frequency_tolerance: float = 0.003,
+    spectra: Sequence[RecordSpectrum], orders: Sequence[int], band_rad_s: tuple[float, float]
 ) -> list[PoleCandidate]:
     """Return the poles that appear at several orders (the stabilisation diagram, as a list), lowest first.
 
@@ -116,13 +116,9 @@ def stable_poles(
         Data and the model orders to try.
     band_rad_s
         Poles outside are dropped.
-    largest_damping_ratio, frequency_tolerance
-        Largest damping ratio of a physical pole, and relative tolerance of the frequency of the same pole.
     """
     found = zip(orders, lscf_poles(spectra, orders, band_rad_s[1]), strict=True)
-    return [
-        candidate_of(group) for group in groups_of_poles(found, band_rad_s, largest_damping_ratio, frequency_tolerance)
-    ]
+    return [candidate_of(group) for group in groups_of_poles(found, band_rad_s)]
 
 
 Occurrence = tuple[float, float, int]
@@ -130,10 +126,7 @@ Occurrence = tuple[float, float, int]
 
 
 def groups_of_poles(
-    found: Iterable[tuple[int, NDArray[np.complex128]]],
-    band_rad_s: tuple[float, float],
-    largest_damping_ratio: float,
-    frequency_tolerance: float,
+    found: Iterable[tuple[int, NDArray[np.complex128]]], band_rad_s: tuple[float, float]
 ) -> list[list[Occurrence]]:
     """Return the poles of all orders with nearly the same frequency as one group, lowest first.
 
@@ -141,18 +134,18 @@ def groups_of_poles(
     ----------
     found
         Model orders and their poles [rad/s].
-    band_rad_s, largest_damping_ratio, frequency_tolerance
-        As for :func:`stable_poles`.
+    band_rad_s
+        Poles outside are dropped, and so are those that are unstable or heavily damped.
     """
     every: list[Occurrence] = []
     for order, poles in found:
         for pole in poles:
             omega, zeta = float(abs(pole)), float(-pole.real / abs(pole))
-            if 0.0 < zeta < largest_damping_ratio and band_rad_s[0] <= omega <= band_rad_s[1]:
+            if 0.0 < zeta < _LARGEST_DAMPING and band_rad_s[0] <= omega <= band_rad_s[1]:
                 every.append((omega, zeta, order))
     groups: list[list[Occurrence]] = []
     for item in sorted(every):
-        if groups and item[0] - np.median([g[0] for g in groups[-1]]) <= frequency_tolerance * item[0]:
+        if groups and item[0] - np.median([g[0] for g in groups[-1]]) <= _SAME_POLE * item[0]:
             groups[-1].append(item)
         else:
             groups.append([item])

@@ -22,9 +22,8 @@ from mrpipe.modal.records import Place, Sensor
 from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_sensors
 
 _ORDERS = 9
-_LARGEST_DAMPING = 0.2
-_TOLERANCE = 0.003
-"""Relative difference of the frequencies of the same pole at two orders."""
+_EQUATIONS_PER_COEFFICIENT = 2.0
+"""Least number of equations for each coefficient of an output."""
 
 
 def common_sensors(spectra: Sequence[RecordSpectrum]) -> list[Sensor]:
@@ -32,25 +31,38 @@ def common_sensors(spectra: Sequence[RecordSpectrum]) -> list[Sensor]:
     return [sensor for sensor in all_sensors(spectra) if all(sensor in item.sensors for item in spectra)]
 
 
+def matrix_orders(spectra: Sequence[RecordSpectrum], modes: int) -> range:
+    """Return up to nine orders of the matrix polynomial; the lowest has at least one pair of poles for each mode.
+
+    The range is empty, or shorter, where the records have fewer than two common sensors, or too few lines for so many
+    coefficients.
+    """
+    outputs = len(common_sensors(spectra))
+    if outputs < 2:
+        return range(0)
+    least = max(2, -(-2 * modes // outputs) + 1)
+    free = len(all_inputs(spectra)) + len(spectra)
+    equations = 2 * sum(item.omega.size for item in spectra)
+    most = int((equations / _EQUATIONS_PER_COEFFICIENT - free) / (outputs + free))
+    return range(least, min(least + _ORDERS, most + 1))
+
+
 def stable_matrix_poles(
-    spectra: Sequence[RecordSpectrum], modes: int, band_rad_s: tuple[float, float]
+    spectra: Sequence[RecordSpectrum], orders: Sequence[int], band_rad_s: tuple[float, float]
 ) -> list[PoleCandidate]:
-    """Return the poles that appear at several of nine orders of the matrix polynomial, lowest first.
+    """Return the poles that appear at several orders of the matrix polynomial, lowest first.
 
     Parameters
     ----------
     spectra
-        Whole-record spectra of forced tests with at least two common sensors.
-    modes
-        Largest number of modes; the lowest order has at least this number of pairs of poles.
+        Whole-record spectra of forced tests.
+    orders
+        Orders to try, see :func:`matrix_orders`.
     band_rad_s
         Poles outside are dropped; the upper end corresponds to 0.95 pi on the unit circle.
     """
-    least = max(2, -(-2 * modes // len(common_sensors(spectra))) + 1)
-    orders = range(least, least + _ORDERS)
     found = zip(orders, matrix_fraction_poles(spectra, orders, band_rad_s[1]), strict=True)
-    groups = groups_of_poles(found, band_rad_s, _LARGEST_DAMPING, _TOLERANCE)
-    return [candidate_of(part) for group in groups for part in _divided(group)]
+    return [candidate_of(part) for group in groups_of_poles(found, band_rad_s) for part in _divided(group)]
 
 
 def _divided(group: Sequence[Occurrence]) -> list[list[Occurrence]]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.modal.fit.lscf import PoleCandidate, stable_poles
-from mrpipe.modal.fit.matrix_fraction import common_sensors, stable_matrix_poles
+from mrpipe.modal.fit.matrix_fraction import matrix_orders, stable_matrix_poles
 from mrpipe.modal.fit.multimode import fit_modes
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -31,6 +31,8 @@ from mrpipe.modal.spectra import RecordSpectrum, excited_band, record_spectrum, 
 
 _USUAL_HIGH_HZ = 30.0
 _SURPLUS = 4
+_FEWEST_ORDERS = 5
+"""Least number of orders of a matrix-fraction model that show which poles are stable."""
 _LAST_BAND = 1.25
 _ROUNDS = 3
 _SEARCH_LINES = 2500
@@ -112,11 +114,13 @@ def _look(
     modes = layout.modes
     whole, spectra = spectra, thinned(spectra, _SEARCH_LINES)
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
-    orders = range(2 * modes + 2, 2 * modes + 20, 2)
-    if not layout.is_chain and len(common_sensors(spectra)) > 1:
-        candidates = stable_matrix_poles(spectra, modes, (0.0, 2.0 * np.pi * band_hz[1]))
+    whole_band = (0.0, 2.0 * np.pi * band_hz[1])
+    orders = range(0) if layout.is_chain else matrix_orders(spectra, modes)
+    if len(orders) >= _FEWEST_ORDERS:
+        candidates = stable_matrix_poles(spectra, orders, whole_band)
     else:
-        candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
+        orders = range(2 * modes + 2, 2 * modes + 20, 2)
+        candidates = stable_poles(spectra, orders, whole_band)
     candidates = [item for item in candidates if band[0] <= item.angular_frequency <= band[1]]
     # poles at the end of the band are often numerical: they occur less often and have more damping
     candidates.sort(key=lambda item: (-item.occurrences, item.damping_ratio))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrpipe.modal.fit.lscf import stable_poles
-from mrpipe.modal.fit.matrix_fraction import _divided, stable_matrix_poles
+from mrpipe.modal.fit.matrix_fraction import _divided, matrix_orders, stable_matrix_poles
 from mrpipe.modal.spectra import record_spectrum
 from tests.modal.plates import building, shaken
 
@@ -24,7 +26,7 @@ def test_close_modes_are_resolved_by_their_shapes() -> None:
     test = shaken(tower, rng, rate=50.0, duration_s=300.0).forced[0]
     band = (0.0, 2.0 * np.pi * 19.0)
     spectra = [record_spectrum(test, (0.2, 19.0))]
-    found = _light(stable_matrix_poles(spectra, 12, band))
+    found = _light(stable_matrix_poles(spectra, matrix_orders(spectra, 12), band))
     frequency = np.array([item.angular_frequency for item in found]) / (2.0 * np.pi)
     damping = np.array([item.damping_ratio for item in found])
     assert frequency == pytest.approx(tower.frequencies_hz, rel=2e-3)
@@ -32,6 +34,26 @@ def test_close_modes_are_resolved_by_their_shapes() -> None:
     assert damping[:-1] == pytest.approx(tower.damping_ratios[:-1], rel=0.25)
     common = _light(stable_poles(spectra, range(26, 44, 2), band))
     assert len(common) < 12, "a common denominator shows all modes: the case no longer tests what it should"
+
+
+@pytest.mark.property
+def test_there_are_no_more_coefficients_than_the_lines_determine() -> None:
+    test = shaken(building(np.random.default_rng(1), 3), np.random.default_rng(2), rate=50.0, duration_s=60.0).forced[0]
+    spectrum = record_spectrum(test, (0.2, 19.0))
+    assert matrix_orders([spectrum], 9) == range(3, 12)
+    short = record_spectrum(
+        replace(
+            test,
+            responses=test.responses[:300],
+            excitation=test.excitation[:300],
+            further_inputs=tuple((p, v[:300]) for p, v in test.further_inputs),
+        ),
+        (0.2, 19.0),
+    )
+    assert matrix_orders([short], 9) == range(3, 10)
+    single = replace(test, responses=test.responses[:, :1], places=test.places[:1], is_displacement=(False,))
+    assert len(matrix_orders([record_spectrum(single, (0.2, 19.0))], 9)) == 0
+    assert len(matrix_orders([spectrum, record_spectrum(single, (0.2, 19.0))], 9)) == 0, "one common sensor"
 
 
 @pytest.mark.property
