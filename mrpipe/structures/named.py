@@ -57,11 +57,6 @@ def require_places(settings: StructureSettings, read: Reader) -> tuple[str, ...]
     return names
 
 
-def names_of_structure(settings: StructureSettings, read: Reader) -> tuple[str, ...]:
-    """Return the names of all degrees of freedom before a reduction; empty if only the matrices show them."""
-    return settings.degrees_of_freedom or _floors(_count(settings, read))
-
-
 def _floors(count: int) -> tuple[str, ...]:
     return tuple(f"floor {place + 1}" for place in range(count))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.structures.named import names_of_structure, require_places
+from mrpipe.structures.named import require_places
 from mrpipe.structures.options import StructureSettings
 
 pytestmark = pytest.mark.property
@@ -35,14 +35,14 @@ def read(_: Path, name: str) -> Any:
     ],
 )
 def test_names_of_every_kind_of_structure(given: dict[str, Any]) -> None:
-    assert names_of_structure(StructureSettings(**given), read) == FLOORS
+    assert require_places(StructureSettings(**given), read) == FLOORS
     named = StructureSettings(**given, degrees_of_freedom=("a", "b", "c"))
-    assert names_of_structure(named, read) == ("a", "b", "c")
+    assert require_places(named, read) == ("a", "b", "c")
 
 
 def test_a_parameter_set_has_its_floors_and_a_script_is_not_run() -> None:
-    assert len(names_of_structure(StructureSettings(frame="thesis"), read)) == 5
-    assert names_of_structure(StructureSettings(file="model.py"), read) == ()
+    assert len(require_places(StructureSettings(frame="thesis"), read)) == 5
+    assert require_places(StructureSettings(file="model.py"), read) == ()
     assert require_places(StructureSettings(file="model.py", dampers=({"between": ("x", "y")},)), read) == ()
 
 
